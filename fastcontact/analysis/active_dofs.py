@@ -45,6 +45,9 @@ class ActiveDofs:
         Positions, among the active components, of those on which contact depends.
     determined : ndarray of int
         Positions, among the active components, of those at which direct solvers compute the solutions of the contact problem.
+    T, transpose : csr_array (k, l), csr_array (l, k)
+        Derivatives of the active components with respect to the active unknowns [-], and their transpose, which maps forces
+        on the active components to generalised forces.
     """
 
     def __init__(
@@ -55,8 +58,8 @@ class ActiveDofs:
         self.compared, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact_dofs, involved))
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free
-        self._system, self._T = system, csr_array(csr_array(T)[self.active][:, self._unknowns])
-        self._transpose = csr_array(self._T.T)
+        self._system, self.T = system, csr_array(csr_array(T)[self.active][:, self._unknowns])
+        self.transpose = csr_array(self.T.T)
 
     def largest_condensed(self, u: Array, lift: Array) -> float:
         """Return the largest absolute value of the unknowns of displacements `u` that are condensed."""
@@ -87,15 +90,7 @@ class ActiveDofs:
 
     def displacement(self, v: Array, lift: Array) -> Array:
         """Return the active components (k,) for active unknowns `v`."""
-        return np.asarray(lift[self.active] + self.varied(v))
-
-    def varied(self, v: Array) -> Array:
-        """Return the change (k,) of the active components due to a change `v` of the active unknowns."""
-        return np.asarray(self._T @ v)
-
-    def reduced(self, force: Array) -> Array:
-        """Return the generalised forces (l,) on the active unknowns, given nodal forces (n,) [force]."""
-        return np.asarray(self._transpose @ force[self.active])
+        return np.asarray(lift[self.active] + self.T @ v)
 
     def numbers(self, unknowns: Indices) -> Indices:
         """Return the positions (k,) of `unknowns` (k,), numbers of unknowns of the system, among the active unknowns."""

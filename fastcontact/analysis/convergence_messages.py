@@ -41,7 +41,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     declining = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
     size = changes[-1] if declining else max(changes[-WINDOW:])
     more = ["more updates (Criteria.max_geometry_updates)"] if declining else []
-    advice = [*more, *(_bilateral_advice(problem) or _smoothing_advice(problem, last["nodes"]))]
+    advice = [*more, *_advice_for_pairs(problem, last["nodes"])]
     advice.append("a fixed number of updates (Criteria.geometry_updates)")
     if float(f"{size:.0e}") < NOTABLE:  # otherwise `Criteria` refuses it
         criterion = f"Criteria.geometry, which is {problem.criteria.geometry:g}, above {size:.0e}"
@@ -53,17 +53,6 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
         f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. "
         f"{'' if declining else 'These changes do not decline. '}Use {use}"
     )
-
-
-def _bilateral_advice(problem: Problem) -> list[str]:
-    """Return the remedy for a bilateral pair, whose constraints close gaps of any width; empty if gaps are round-off."""
-    for name, pair in problem.pairs.items():
-        if pair.options.kind == "bilateral":
-            gap = pair.nodal_gap(Configuration.undeformed(pair.points))[0]
-            widest = float(gap.max(where=np.isfinite(gap), initial=0.0))
-            if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
-                return [f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close"]
-    return []
 
 
 def active_set_cycles(problem: Problem, constraints: StackedConstraints, solution: Solution, nodes: Nodes) -> str:
@@ -188,11 +177,18 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
     return "; ".join(texts)
 
 
-def _smoothing_advice(problem: Problem, nodes: Nodes) -> list[str]:
-    """Return remedies for pairs that alternate between facets at a node, supports of dual functions, or branches of a law.
+def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
+    """Return the remedy for a bilateral pair, whose constraints close gaps of any width that is not round-off.
 
-    Each remedy is for the first such pair of `nodes`, whose displacements change most.
+    Without such a pair, return remedies for pairs that alternate between facets at a node, supports of dual functions, or
+    branches of a law. Each remedy is for the first such pair of `nodes`, whose displacements change most.
     """
+    for name, pair in problem.pairs.items():
+        if pair.options.kind == "bilateral":
+            gap = pair.nodal_gap(Configuration.undeformed(pair.points))[0]
+            widest = float(gap.max(where=np.isfinite(gap), initial=0.0))
+            if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
+                return [f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close"]
     pairs = {name: problem.pairs[name] for name in nodes}
     faceted = [name for name, pair in pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
     laws = {name: pair.options.cohesion for name, pair in pairs.items() if pair.options.cohesion is not None}

@@ -13,7 +13,7 @@ The pressure of a fluid between the contact surfaces is a term.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any, Protocol
 
@@ -22,6 +22,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
@@ -357,7 +358,7 @@ class StepEquilibrium:
             "active_set_iterations": sum(map(itemgetter("active_set_iterations"), history)),
             "linear_iterations": linear_iterations,
             "history": history,
-            **({} if scatter is None else {"scatter": asdict(scatter)}),
+            **({} if scatter is None else {"scatter": scatter}),
         }
         if self.terms is None:
             return counts
@@ -372,15 +373,14 @@ def with_loads(problem: Problem, load: StepLoad) -> Loaded:
 
 
 def solve_displacements(
-    problem: Problem, load: StepLoad, loaded: Loaded, settled: SettledContact | None, guess: Array,
-    tolerance: float | None = None,
-) -> tuple[Array, Array]:  # fmt: skip
+    step: StepContext, settled: SettledContact | None, guess: Array, tolerance: float | None = None
+) -> tuple[Array, Array]:
     """Return all displacements (n_dofs,) [length] and the nodal contact forces (n_dofs,) [force].
 
     `settled` is the contact solution, None without contact. Iterative solvers then begin with the displacements `guess`
     (n_dofs,) [length], and stop at a relative residual `tolerance` [-] or at their own tolerance.
     """
-    system, lift = problem.system, load.lift
+    problem, loaded, system, lift = step.problem, step.loaded, step.problem.system, step.load.lift
     if settled is None:
         no_constraints = csr_array((0, len(lift))), np.empty(0)
         v = loaded.solve(*no_constraints, guess=system.unknowns(guess, lift), tolerance=tolerance)[0]

@@ -52,7 +52,7 @@ class Extrapolation:
         `quantities` are arrays of prescribed displacements [length] and of forces [force].
         """
         loads = (*self.loads[-2:], tuple(quantity.copy() for quantity in quantities))
-        ratio = _growth(loads) if len(self.states) >= 2 else 0.0
+        ratio = _increment_ratio(loads) if len(self.states) >= 2 else 0.0
         return replace(self, ratios=(*self.ratios[1 - DEGREE :], ratio), loads=loads)
 
     def converged(self, u: Array, contact: Mapping[str, GapsAndForces], curve: bool = False) -> Extrapolation:
@@ -70,13 +70,13 @@ class Extrapolation:
         degree = max(1, degree + (degree == highest))
         return replace(self, degree=degree, states=(*self.states[-DEGREE if curve else -1 :], (u.copy(), contact)))
 
-    def displacement(self, u: Array) -> Array:
-        """Return linearly extrapolated initial displacements (n,) of a step [length]; without extrapolation `u` (n,)."""
-        return self._polynomial_at_load(1) if self.ratio else u
+    def predicted(self, u: Array, degree: int | None = None) -> Array:
+        """Return initial displacements (n,) of a step [length]; without extrapolation `u` (n,).
 
-    def predicted(self, u: Array) -> Array:
-        """Return initial displacements (n,) as `displacement` does, but by the polynomial of the chosen degree."""
-        return self._polynomial_at_load(min(self.degree, self._highest_degree)) if self.ratio else u
+        They are those of the polynomial of a given `degree`, by default of the chosen one.
+        """
+        degree = min(self.degree, self._highest_degree) if degree is None else degree
+        return self._polynomial_at_load(degree) if self.ratio else u
 
     def midway(self, begin: Array, u: Array) -> Array:
         """Return displacements (n,) in the middle of the step from `begin` (n,) to u (n,) [length].
@@ -143,20 +143,17 @@ class Extrapolation:
         return cls(tuple(data.get("ratios", ())), int(data.get("degree", 1)), loads, states)
 
 
-def _growth(loads: tuple[tuple[Array, ...], ...]) -> float:
-    """Return the ratio of the last of two increments of the loads to the first; zero if steps are not extrapolated."""
-    growth = next((r for r in map(_ratio, *loads) if r is not None), 0.0) if len(loads) == 3 else 0.0
-    return growth if 0.0 < growth <= FARTHEST else 0.0
+def _increment_ratio(loads: tuple[tuple[Array, ...], ...]) -> float:
+    """Return the ratio of the last increment of the loads to the one before it; zero if steps are not extrapolated.
 
-
-def _ratio(first: Array, second: Array, third: Array) -> float | None:
-    """Return the ratio of the last increment of a load to the one before it; None if the latter is zero.
-
-    The load has the values `first`, `second` and `third` (n,) in successive steps.
+    It is that of the first of the `loads` of successive steps whose earlier increment is not zero.
     """
-    increment, last_increment = third - second, second - first
-    squared_norm = float(np.sum(last_increment * last_increment))
-    return float(np.sum(increment * last_increment)) / squared_norm if squared_norm else None
+    for first, second, third in zip(*loads) if len(loads) == 3 else ():
+        increment, last_increment = third - second, second - first
+        if squared_norm := float(np.sum(last_increment * last_increment)):
+            ratio = float(np.sum(increment * last_increment)) / squared_norm
+            return ratio if 0.0 < ratio <= FARTHEST else 0.0
+    return 0.0
 
 
 def _sparse(values: Array) -> dict[str, Any]:

@@ -118,10 +118,10 @@ class PositionResponse:
         """
         resolved, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = float(norm(elongation - self.elongation_rates @ resolved))
-        held = remaining <= SINGLE_PRECISION * norm(elongation)
+        restrained = remaining <= SINGLE_PRECISION * norm(elongation)
         # The linear response is more accurate than the least work of friction if it hardly changes the slips.
         slip_change = largest(self.gap_rates[1:, sliding] @ resolved)
-        if not held or slip_change > NOTABLE * largest(solution.slip[sliding]):
+        if not restrained or slip_change > NOTABLE * largest(solution.slip[sliding]):
             U, s, V = np.linalg.svd(self.elongation_rates)
             # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for
             # example only because the friction force turns with the slip direction (a box that rides on a driven one in 3D).
@@ -130,7 +130,7 @@ class PositionResponse:
             if largest(slide) > largest(elongation) and slide @ last_slide >= 0.0:
                 return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
         change = -resolved
-        if not held:
+        if not restrained:
             motion = elongation - self._inverse @ (self.elongation_rates @ elongation)
             approach, threshold = -self.gap_rates[0] @ motion, LENGTH_ROUND_OFF * remaining
             # Gaps of active constraints are round-off.
@@ -254,10 +254,12 @@ class FloatingBodies:
         modes = system.unknowns_of(motions.displacement)
         _, _, order = qr((modes * weights[:, None]).T, mode="economic", pivoting=True)
         self.dofs = np.sort(order[: modes.shape[1]]).astype(np.intp)
-        self._spring_labels = [
-            f"{'xyz'[k % self._dim]} of {self._owner(motions, k, weightless)}" for k in self.dofs.tolist()
-        ]
         self._values_at_springs = motions.displacement[self.dofs]
+        self._spring_labels = []
+        for dof, modes_at_spring in zip(self.dofs.tolist(), self._values_at_springs, strict=True):
+            row, component = divmod(dof, self._dim)
+            obstacle = motions.labels[int(np.argmax(np.abs(motions.parts[:, np.argmax(np.abs(modes_at_spring))])))].body
+            self._spring_labels.append(f"{'xyz'[component]} of {obstacle if weightless[dof] else f'point {row}'}")
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._values_at_springs), np.float64))
         # A body on soft springs of the model that slides on an incline moves in all directions, which stiffer springs would
         # prevent.
@@ -344,13 +346,6 @@ class FloatingBodies:
         _, values, V = np.linalg.svd(np.vstack([rows @ self.motions.displacement for rows in restraints]))
         free = np.append(values, np.zeros(len(V) - len(values))) <= SINGLE_PRECISION
         return self.motions.combined(V[free].T).by_body() if free.any() else {}
-
-    def _owner(self, motions: FreeMotions, dof: int, weightless: Mask) -> str:
-        """Return the name of the point or obstacle to which the spring at component `dof` is attached."""
-        if not weightless[dof]:
-            return f"point {dof // self._dim}"
-        column = int(np.argmax(np.abs(motions.displacement[dof])))
-        return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))].body
 
     def moving(self, rigid: RigidPosition) -> list[str]:
         """Return the motions of bodies in the free rigid-body modes with the largest generalised forces of the springs."""

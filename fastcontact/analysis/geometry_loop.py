@@ -15,7 +15,7 @@ of second order.
 from __future__ import annotations
 
 import logging
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -24,11 +24,11 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.friction_increments import FrictionIncrements
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
-from fastcontact.analysis.tolerances import Scatter, ScatterWindow, Tolerances
-from fastcontact.analysis.touching import Touching
+from fastcontact.analysis.tolerances import ScatterWindow, Tolerances
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
@@ -53,8 +53,8 @@ class SettledContact:
     iterate : Iterate
     last_change : (int, float), optional
         The number of updates, if it is fixed, and the relative change of the displacements in the last update.
-    scatter : Scatter, optional
-        Scatter of the last iterates, if round-off prevents convergence to `Criteria.geometry`.
+    scatter : dict, optional
+        Scatter of the last iterates, see `ScatterWindow.add`, if round-off prevents convergence to `Criteria.geometry`.
     nodes : SharedNodes, optional
         Nodes of several pairs, or at both ends of a period, whose constraints are merged.
     paired_at : ndarray (k,), optional
@@ -65,15 +65,9 @@ class SettledContact:
     solution: Solution
     iterate: Iterate
     last_change: tuple[int, float] | None = None
-    scatter: Scatter | None = None
+    scatter: dict[str, float] | None = None
     nodes: SharedNodes | None = None
     paired_at: Array | None = None
-
-    @property
-    def gaps_and_forces(self) -> dict[str, tuple[Array, Array]]:
-        """Gaps (m,) [length] and multipliers (m,) [force] of each contact pair."""
-        gap, force = self.solution.gap, self.solution.multiplier
-        return {name: (gap[rows], force[rows]) for name, rows in self.constraints.rows.items()}
 
     @property
     def force(self) -> Array:
@@ -81,8 +75,10 @@ class SettledContact:
         return self.constraints.force(self.solution.multiplier, self.solution.tangential)
 
 
-def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact | None = None) -> SettledContact:
+def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact | None = None) -> SettledContact | None:
     """Alternate between pairing the surfaces and solving the contact problem until the displacements converge.
+
+    The result is None without contact pairs.
 
     Parameters
     ----------
@@ -97,9 +93,14 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
     ConvergenceError
         If the active set or the geometry does not converge.
     """
-    touching = Touching(step)
+    problem, u, bodies = step.problem, iterate.u, step.problem.floating_bodies
+    if not problem.pairs:
+        return None
+    lift = step.load.lift if bodies is None else step.load.lift + bodies.rigid(u[bodies.dofs])
+    step = replace(step, loaded=step.loaded.condensed(), condensed_size=problem.dofs.largest_condensed(u, lift))
+    increments = FrictionIncrements(step)
     try:
-        settled = _settle(step, iterate, touching, paired if step.linearises_contact else None)
+        settled = _settle(step, iterate, increments, paired if step.linearises_contact else None)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
@@ -111,7 +112,7 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
 
 
 def _settle(
-    step: StepContext, iterate: Iterate, touching: Touching, paired: SettledContact | None = None
+    step: StepContext, iterate: Iterate, increments: FrictionIncrements, paired: SettledContact | None = None
 ) -> SettledContact:
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
     problem, criteria = step.problem, step.problem.criteria
@@ -122,25 +123,25 @@ def _settle(
     tolerances = Tolerances(problem.solver, criteria, extrapolates, step.state.gap_round_off, step.expected)
     mixing, window = _Mixing(step), ScatterWindow()
     if extrapolates:
-        iterate.u = step.extrapolation.displacement(iterate.u)
+        iterate.u = step.state.extrapolation.predicted(iterate.u, degree=1)
     for update in range(limit + 1):
         if update == 0 and paired is not None and paired.paired_at is not None:
             iterate.u[problem.contact_dofs], constraints = paired.paired_at, paired.constraints
         else:
             constraints = pair_surfaces(problem, step.state, step.load, iterate)
-        active = initially_active(constraints, iterate, step.extrapolation if extrapolates and update == 0 else None)
+        extrapolation = step.state.extrapolation if extrapolates and update == 0 else None
+        active = initially_active(constraints, iterate, extrapolation)
         accuracy = tolerances.accuracy(largest(step.load.lift) + largest(iterate.u))
         # Constraints of several pairs, or of both ends of a period, may be at one node.
         ends = problem.model.periodic_interfaces
         nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None
-        merged, closed = (
-            (constraints, active) if nodes is None else (nodes.merged_constraints(constraints), nodes.closed(active))
-        )
-        step_on_path = touching.step(step, constraints, iterate, nodes)
-        if touching.unfinished:
+        merged = constraints if nodes is None else nodes.merged_constraints(constraints)
+        closed = active if nodes is None else nodes.summed(active) > 0.0
+        step_on_path = increments.with_path(step, constraints, iterate.u, nodes)
+        if increments.unfinished:
             accuracy = Accuracy(0.0, residual=problem.solver.tolerance)
         solution, displacement = solve_inequalities(step_on_path, merged, iterate, closed & merged.usable, accuracy)
-        if touching.unfinished:
+        if increments.unfinished:
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
             step = replace(step, path=solution.slip_so_far)
@@ -153,26 +154,23 @@ def _settle(
             raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue
+        change, size = last_update.change, last_update.size
+        enough = tolerances.enough(size)
         if not tolerances.inexact:
-            excess = last_update.change - tolerances.enough(last_update.size)
-            touching.check(step, constraints, solution, excess, last_update.size, iterate.u)
-        paired_at = last_update.before[step.dofs.compared]
+            increments.check(constraints, solution, change - enough, size, iterate.u)
+        paired_at = last_update.before[problem.dofs.compared]
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=paired_at)
         if not solution.settled or tolerances.inexact:
             window = ScatterWindow()
-        elif last_update.change <= tolerances.enough(last_update.size) and not (touching.due or touching.unfinished):
+        elif change <= enough and not (increments.due or increments.unfinished):
             return settled
-        elif scatter := window.add(
-            displacement, settled.force, last_update.change, last_update.size, mixing.contraction
-        ):
+        elif scatter := window.add(displacement, settled.force, change, size, mixing.contraction):
             log.info(
                 "the contact geometry settled as far as round-off allows: displacements scatter by %.1e of the largest one, "
-                "contact forces by %.1e (Criteria.geometry = %g)", *astuple(scatter), problem.criteria.geometry,
+                "contact forces by %.1e (Criteria.geometry = %g)", *scatter.values(), problem.criteria.geometry,
             )  # fmt: skip
             return replace(settled, scatter=scatter)
-        next_pairing = mixing.next(settled, last_update, displacement, tolerances)
-        if next_pairing is not None:
-            iterate.u[step.dofs.active] = next_pairing
+        iterate.u[problem.dofs.active] = mixing.next(settled, last_update, displacement, enough, tolerances.inexact)
         tolerances.tighten(last_update.relative, solution.residual)
         late = update >= max(limit // 2, PATIENT_UPDATES) and not iterate.rounded
         if late and any(pair.alternates(constraints.parts[name]) for name, pair in problem.pairs.items()):
@@ -180,20 +178,20 @@ def _settle(
             iterate.rounded = True
             mixing.accelerated, window = None, ScatterWindow()
     if problem.until_settled:
-        change = np.zeros_like(iterate.u)
-        change[step.dofs.active] = displacement - last_update.before
-        raise ConvergenceError(geometry_moves(problem, iterate.history, change, limit), iterate.history)
-    touching.check(step, constraints, solution, 0.0, 0.0, iterate.u)
-    if touching.due or touching.unfinished:
+        changes = np.zeros_like(iterate.u)
+        changes[problem.dofs.active] = displacement - last_update.before
+        raise ConvergenceError(geometry_moves(problem, iterate.history, changes, limit), iterate.history)
+    increments.check(constraints, solution, 0.0, 0.0, iterate.u)
+    if increments.due or increments.unfinished:
         del iterate.history[-limit - 1 :]
-        return _settle(step, iterate, touching)
+        return _settle(step, iterate, increments)
     fixed = limit and not criteria.keep_pairing
     return SettledContact(constraints, solution, iterate, (limit, last_update.relative) if fixed else None, nodes=nodes)
 
 
 @dataclass(frozen=True, eq=False)
 class _Update:
-    """Change of the displacements in one geometry update, in the components of `StepContext.dofs`.
+    """Change of the displacements in one geometry update, in the components of `Problem.dofs`.
 
     Attributes
     ----------
@@ -216,9 +214,10 @@ class _Update:
 def _store_solution(
     step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, displacement: Array
 ) -> _Update:
-    """Store a solution, and its displacements (k,) of the components of `step.dofs` [length], in the iterate."""
-    before = iterate.u[step.dofs.active]
-    iterate.u[step.dofs.active] = displacement
+    """Store a solution, and its displacements (k,) of the components of `Problem.dofs` [length], in the iterate."""
+    active_dofs = step.problem.dofs.active
+    before = iterate.u[active_dofs]
+    iterate.u[active_dofs] = displacement
     # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
     size = max(step.condensed_size, largest(solution.u), largest(step.load.lift))
     change = largest(displacement - before)
@@ -260,19 +259,19 @@ class _Mixing:
     accelerated: Anderson | None
 
     def next(
-        self, settled: SettledContact, last_update: _Update, displacement: Array, tolerances: Tolerances
-    ) -> Array | None:
-        """Return the displacements (k,) for the next pairing, of the components of `StepContext.dofs` [length].
+        self, settled: SettledContact, last_update: _Update, displacement: Array, enough: float, inexact: bool
+    ) -> Array:
+        """Return the displacements (k,) for the next pairing, of the components of `Problem.dofs` [length].
 
-        None means the displacements of the solution, `displacement` (k,). Newton's method is abandoned once changes increase,
-        because it does not converge if nodes alternate between facets. It is also omitted if the next solution alone is
-        expected to converge, because a solution without a Newton step is cheaper.
+        After an `inexact` solution, these are the displacements of the solution, `displacement` (k,). Changes below `enough`
+        [length] have converged. Newton's method is abandoned once changes increase, because it does not converge if nodes
+        alternate between facets. It is also omitted if the next solution alone is expected to converge, because a solution
+        without a Newton step is cheaper.
         """
-        solution, enough = settled.solution, tolerances.enough(last_update.size)
-        self._newton, self._change = self._newton and last_update.change <= self._change, last_update.change
-        if self._newton and solution.settled and SAFETY * self.contraction * last_update.change > enough:
-            arguments = self._step, settled.constraints, solution, last_update.before, displacement
-            newton_result = newton_step(*arguments, enough / last_update.change, settled.nodes)
+        solution, before, change = settled.solution, last_update.before, last_update.change
+        self._newton, self._change = self._newton and change <= self._change, change
+        if self._newton and solution.settled and SAFETY * self.contraction * change > enough:
+            newton_result = newton_step(self._step, settled, before, displacement, enough / change)
             if newton_result is not None:
                 next_pairing, self.contraction = newton_result
                 return next_pairing
@@ -283,38 +282,35 @@ class _Mixing:
         self._cycles |= not (same_state or self._newton) and state in self._earlier_states
         self._last_state = state if solution.settled else b""
         self._earlier_states.add(self._last_state)
-        if tolerances.inexact or not (same_state or self._cycles or settled.iterate.rounded):
+        if inexact or not (same_state or self._cycles or settled.iterate.rounded):
             self.accelerated = None
-        if tolerances.inexact:
-            return None
+        if inexact:
+            return displacement
         if self.accelerated is None:
-            self.accelerated = Anderson(DEPTH, self._step.dofs.compared, self._step.problem.solver.iterative)
-        return self.accelerated.mixed(last_update.before, displacement)
+            problem = self._step.problem
+            self.accelerated = Anderson(DEPTH, problem.dofs.compared, problem.solver.iterative)
+        return self.accelerated.mixed(before, displacement)
 
 
 def newton_step(
-    step: StepContext, constraints: StackedConstraints, solution: Solution, before: Array, image: Array, accuracy: float,
-    nodes: SharedNodes | None = None,
-) -> tuple[Array, float] | None:  # fmt: skip
+    step: StepContext, settled: SettledContact, before: Array, image: Array, accuracy: float
+) -> tuple[Array, float] | None:
     """Return the active displacements (k,) of the next pairing [length], and the norm of S'; None without derivatives.
 
     Parameters
     ----------
     step : StepContext
-    constraints : StackedConstraints
-        Paired at displacements `before` (k,) [length].
-    solution : Solution
-        Solution with these constraints, where representatives replace the constraints of shared nodes.
+    settled : SettledContact
+        The last pairing and its solution, where representatives replace the constraints of shared nodes.
     before, image : ndarray (k,)
         Active displacements of the pairing and of the solution [length]. Displacements that solutions do not determine are
         taken from `image`.
     accuracy : float
         Sufficient relative accuracy of the change [-].
-    nodes : SharedNodes, optional
-        Nodes that several pairs, or both ends of a period, share.
     """
-    u = step.state.u.copy()
-    u[step.dofs.active] = image
+    constraints, solution, nodes = settled.constraints, settled.solution, settled.nodes
+    u, dofs = step.state.u.copy(), step.problem.dofs
+    u[dofs.active] = image
     displacement = step.problem.displacement(u)
     if nodes is not None:
         solution = nodes.with_distributed_forces(solution, constraints, u)
@@ -324,7 +320,7 @@ def newton_step(
         respond = solution.response()
     except LinAlgError:
         return None
-    where, gaps = step.dofs.compared, np.zeros((1 + len(constraints.tangents), len(constraints)))
+    where, gaps = dofs.compared, np.zeros((1 + len(constraints.tangents), len(constraints)))
 
     def response_along(v: Array) -> Array:
         """Return the active components (k,) of ``S'(u) v`` for the components v on which contact depends."""
@@ -336,7 +332,7 @@ def newton_step(
             gaps[: len(slips), rows] = slips
             force[: forces.size] += forces.ravel()
         merged = gaps if nodes is None else nodes.merged_gaps(gaps)
-        return step.dofs.varied(respond(step.dofs.reduced(force), merged))
+        return np.asarray(dofs.T @ respond(dofs.transpose @ force[dofs.active], merged))
 
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - response_along(v)[where], dtype=float)
@@ -347,7 +343,7 @@ def newton_step(
     # Far from the solution, a step in which the response exceeds the change itself is unreliable.
     if not response_size <= largest_change:
         return None
-    next_pairing, determined = image.copy(), step.dofs.determined
+    next_pairing, determined = image.copy(), dofs.determined
     if len(determined) > len(where):  # there are springs of floating bodies
         next_pairing[determined] += largest_change * response_along(v)[determined]
     else:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis import active_set
-from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.convergence_messages import friction_exceeded, not_balanced
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
@@ -128,11 +127,7 @@ class StepContext:
         State at the beginning of the step.
     load : StepLoad
     loaded : Loaded
-        The prepared matrix with the right-hand side of the step, in the unknowns of `dofs`.
-    dofs : ActiveDofs
-        Unknowns of the contact problem: all of them, or those of the contact surfaces after static condensation.
-    extrapolation : Extrapolation
-        Extrapolation of earlier steps, with which the step begins.
+        The prepared matrix with the right-hand side of the step; in the geometry loop in the unknowns of `Problem.dofs`.
     expected : float
         Scale of the displacements in the first step, if only forces act [length].
     index : int
@@ -148,8 +143,6 @@ class StepContext:
     state: State
     load: StepLoad
     loaded: Loaded
-    dofs: ActiveDofs
-    extrapolation: Extrapolation = field(default_factory=Extrapolation)
     expected: float = 0.0
     index: int = 0
     condensed_size: float = 0.0
@@ -217,12 +210,12 @@ def solve_inequalities(
     -------
     solution : Solution
     displacement : ndarray (k,)
-        Displacement components of `step.dofs` [length].
+        Displacement components of `Problem.dofs` [length].
     """
     if step.problem.floating_bodies is not None:
         return _with_floating_bodies(step, step.problem.floating_bodies, constraints, iterate, active, accuracy)
     solution = _solve(step, constraints, iterate, active, accuracy, step.load.lift, iterate.u)
-    return solution, step.dofs.displacement(solution.u, step.load.lift)
+    return solution, step.problem.dofs.displacement(solution.u, step.load.lift)
 
 
 def _solve(
@@ -233,8 +226,8 @@ def _solve(
     `lift` (n_dofs,) are the displacements that supports and multi-point constraints prescribe if all unknowns are zero, and
     `guess` (n_dofs,) are initial displacements [length].
     """
-    condensed = step.dofs.constraints(constraints, lift, step.state.u)
-    u = step.dofs.unknowns(guess, lift)
+    condensed = step.problem.dofs.constraints(constraints, lift, step.state.u)
+    u = step.problem.dofs.unknowns(guess, lift)
     if not constraints.tangents:
         return active_set.solve(step.loaded, condensed, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
@@ -257,7 +250,7 @@ def _with_floating_bodies(
     Springs that are anchored at a rigid position of these bodies hold them. `FloatingBodies.settle` iterates the position
     until the springs carry no force.
     """
-    problem, state, lift, dofs = step.problem, step.state, step.load.lift, step.dofs
+    problem, state, lift, dofs = step.problem, step.state, step.load.lift, step.problem.dofs
     last_active, guess = active, iterate.u
 
     def solve_at(anchor: Array) -> Solution:

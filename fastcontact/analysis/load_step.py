@@ -110,24 +110,25 @@ def _end_of_step(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
         instant=instant[1], rise=None if heat_solution is None else heat_solution.rise,
     )  # fmt: skip
-    bodies = None if solution.terms is None else solution.terms.bodies.at(u)
-    if bodies is not None:
+    bodies = None
+    if problem.bodies is not None and solution.terms is not None:
+        bodies = solution.terms.bodies.at(u)
         end = replace(end, history=bodies.history)
-    # In the first step, which begins without a history, the path is unknown.
-    flows = problem.bodies is not None and problem.bodies.flows_freely and load.rise is None
-    if problem.bodies is not None and bodies is not None and flows and start.history:
-        displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
-        size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
-        end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))
+        # In the first step, which begins without a history, the path is unknown.
+        if problem.bodies.flows_freely and load.rise is None and start.history:
+            displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
+            size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
+            end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))
     contact: dict[str, ContactResult] = {}
     if settled is not None:
-        end = save_contact_history(problem, start, load, settled, end)
-        contact = contact_results(problem, start, load, settled, end)
-        end, contact = accumulate_results(problem, start, load, settled, end, contact, balance.energy)
+        end, contact = _contact_at_end(problem, start, load, settled, end, balance.energy)
     elif start.work is not None:
         end = replace(end, work=start.work.after(balance.energy, 0.0, (0.0, 0.0, 0.0)))
     if problem.extrapolates:
-        contact_data = {} if settled is None else settled.gaps_and_forces
+        contact_data = {}
+        if settled is not None:
+            gap, force = settled.solution.gap, settled.solution.multiplier
+            contact_data = {name: (gap[rows], force[rows]) for name, rows in settled.constraints.rows.items()}
         extrapolation = start.extrapolation.converged(u, contact_data, problem.bodies is not None)
         end = replace(end, extrapolation=extrapolation)
     if end.work is not None:
@@ -176,11 +177,13 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         if not (extrapolation.loads or state.u.any()):
             extrapolation = extrapolation.to(*map(np.zeros_like, quantities)).converged(state.u, {})
         start = replace(start, extrapolation=extrapolation.to(*quantities))
-    return StepContext(problem, start, load, loaded, problem.dofs, start.extrapolation, expected, index)
+    return StepContext(problem, start, load, loaded, expected, index)
 
 
-def save_contact_history(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
-    """Return the state `end` with the contact data that later steps need, see `State`.
+def _contact_at_end(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: tuple[float, float]
+) -> tuple[State, dict[str, ContactResult]]:
+    """Return the state `end` with the contact data that later steps need, and the results of each contact pair.
 
     In 3D, the point of first contact is constant after the bodies have touched. Before that it is the node with the smallest
     gap at the current positions of obstacles and clearances.
@@ -195,76 +198,66 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
         Contact solution of the step.
     end : State
         State at the end of the step, with its displacements.
+    energy : (float, float)
+        Elastic strain energy and plastic work [energy].
     """
-    displacement, solution, first_contact = problem.displacement(end.u), settled.solution, dict(start.first_contact)
-    never_opening, elastic_slip, bonds = dict(start.never_opening), {}, {}
-    for name, rows in settled.constraints.rows.items():
-        pair, constraints = problem.pairs[name], settled.constraints.parts[name]
+    displacement, solution = problem.displacement(end.u), settled.solution
+    parts, rows_of_pairs = settled.constraints.parts, settled.constraints.rows
+    configurations = {name: problem.configuration(name, start, load, displacement, end.u) for name in parts}
+    first_contact = dict(start.first_contact)
+    for name, configuration in configurations.items():
         if problem.model.mesh.dim == 3 and name not in first_contact:
-            first_contact[name] = pair.first_contact(problem.configuration(name, start, load, displacement, end.u))
+            first_contact[name] = problem.pairs[name].first_contact(configuration)
+    results = contact_results(problem, start, load, settled, replace(end, first_contact=first_contact))
+    touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
+    never_opening, worn, slipped = dict(start.never_opening), dict(start.worn), dict(start.slipped)
+    forces, elastic_slip, bonds, works = dict(start.forces), {}, {}, np.zeros(3)
+    for name, configuration in configurations.items():
+        pair, constraints, rows = problem.pairs[name], parts[name], rows_of_pairs[name]
         if pair.options.kind == "bilateral_once_closed":
             # Points that have slid beyond the other side are included, since they may return to it.
-            closed = solution.active[rows] | constraints.equality
-            never_opening[name] = constraints.positions, closed
+            never_opening[name] = constraints.positions, solution.active[rows] | constraints.equality
         compliant = constraints.compliance is not None or constraints.tangential_softness.any()
         if compliant and constraints.tangents:
             slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
             elastic_slip[name] = constraints.positions, slips
-        if isinstance(constraints.tied, Layer):
-            bonds[name] = constraints.tied.after(constraints, end.u)
-    return replace(
-        end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
-        last_change=settled.last_change, first_contact=first_contact, never_opening=never_opening,
-        elastic_slip=elastic_slip, bonds=bonds,
-    )  # fmt: skip
-
-
-def accumulate_results(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, results: dict[str, ContactResult],
-    energy: tuple[float, float],
-) -> tuple[State, dict[str, ContactResult]]:  # fmt: skip
-    """Return the state `end` and the contact results with accumulated slip, wear and work added.
-
-    `start`, `load`, `settled` and `end` are those of `save_contact_history`; `results` are the contact results of each
-    pair, and `energy` the elastic strain energy and the plastic work [energy].
-    """
-    displacement, results_so_far, works = problem.displacement(end.u), dict(results), np.zeros(3)
-    worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
-    for name, rows in settled.constraints.rows.items():
-        pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
-        configuration = problem.configuration(name, start, load, displacement, end.u)
-        slip = np.zeros_like(contact.coordinates)
+        contact, slip = results[name], np.zeros_like(results[name].coordinates)
         if contact.active.any() and pair.options.kind != "tied":
             rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
             slip = pair.nodal_slip(configuration)
-            if settled.solution.slip_before_closing is not None and constraints.tangents:
-                slip -= mean_slip_before_closing(constraints, settled.solution, rows, contact)
+            if solution.slip_before_closing is not None and constraints.tangents:
+                slip -= mean_slip_before_closing(constraints, solution, rows, contact)
             slip = np.where((contact.active & ~rigid_stick)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
-        results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
-        if name in end.bonds:
-            results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
+        contact = replace(contact, slip=slip, slip_total=slipped[name])
+        if isinstance(constraints.tied, Layer):
+            bonds[name] = constraints.tied.after(constraints, end.u)
+            contact = replace(contact, damage=bonds[name].at(contact.coordinates)[1])
         elif pair.options.kind not in ("tied", "gap_only"):
-            arguments = constraints, settled.solution, rows, configuration, contact, start.forces.get(name)
+            before = start.forces.get(name)
+            arguments = constraints, solution, rows, configuration, contact, before
             forces[name], work_of_pair, slip_integrals = contact_work(pair, *arguments)
             load_of_pair = None
             if pair.friction:
-                closed_before = start.forces[name].pressing > 0.0 if name in start.forces else False
-                closed = contact.active | closed_before
-                load_of_pair = sliding_load(constraints, settled.solution, rows, slip_integrals, closed, pair.secondary)
-            results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0], sliding_load=load_of_pair)
+                closed = contact.active if before is None else contact.active | (before.pressing > 0.0)
+                load_of_pair = sliding_load(constraints, solution, rows, slip_integrals, closed, pair.secondary)
+            contact = replace(contact, dissipation=work_of_pair[0], sliding_load=load_of_pair)
             works += work_of_pair
         if pair.options.wear is not None:
-            before = start.worn.get(name, Worn.nothing(len(contact.points)))
-            worn[name] = before.after(pair, configuration, results_so_far[name], pair.options.wear)
-            results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
-    stored = sum(map(attrgetter("stored"), (*forces.values(), *end.bonds.values())))
-    released = sum(map(attrgetter("released"), end.bonds.values()))
-    work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
-    touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
-    first = {name: positions for name, positions in end.first_contact.items() if name in touched}
-    end = replace(end, worn=worn, slipped=slipped, forces=forces, work=work, touched=touched, first_contact=first)
-    return end, results_so_far
+            wear = start.worn.get(name, Worn.nothing(len(contact.points)))
+            worn[name] = wear.after(pair, configuration, contact, pair.options.wear)
+            contact = replace(contact, wear=worn[name].depth)
+        results[name] = contact
+    stored = sum(map(attrgetter("stored"), (*forces.values(), *bonds.values())))
+    released = sum(map(attrgetter("released"), bonds.values()))
+    end = replace(
+        end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
+        last_change=settled.last_change, never_opening=never_opening, elastic_slip=elastic_slip, bonds=bonds, worn=worn,
+        slipped=slipped, forces=forces, touched=touched,
+        first_contact={name: positions for name, positions in first_contact.items() if name in touched},
+        work=None if start.work is None else start.work.after(energy, stored, works.tolist(), released),
+    )  # fmt: skip
+    return end, results
 
 
 def recover(
@@ -292,25 +285,24 @@ def recover(
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
     loads, iterations = problem.model.loads, dict(iterations)
-    temperature = problem.factors(problem.model.temperatures, instant[1])
-    initial = problem.factors(problem.model.initial_states, instant[1])
-    pressures = problem.factors([load for load in loads if isinstance(load, Pressure)], instant[1])
-    spins = problem.factors([load for load in loads if isinstance(load, Centrifugal)], instant[1])
-    for name, factors in (("temperature", temperature), ("initial", initial), ("pressure", pressures), ("spin", spins)):
-        if factors:
-            iterations[f"{name}_factors"] = factors
+    histories: dict[str, Any] = {
+        "temperature": problem.model.temperatures, "initial": problem.model.initial_states,
+        "pressure": [load for load in loads if isinstance(load, Pressure)],
+        "spin": [load for load in loads if isinstance(load, Centrifugal)],
+    }  # fmt: skip
+    factors = {name: problem.factors(parts, instant[1]) for name, parts in histories.items()}
+    iterations |= {f"{name}_factors": values for name, values in factors.items() if values}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     if points := problem.reference_points:
         iterations["reference_reactions"] = reference_reactions(problem.model, points, reaction, u)
     if sections:
-        factors = problem.factors(sections, instant[1])
-        iterations["pretension"] = section_results(sections, u, reaction, factors)
+        iterations["pretension"] = section_results(sections, u, reaction, problem.factors(sections, instant[1]))
     if bodies is not None:
         stress = recovery.nodal_average(mesh, bodies.stress, problem.sides)
     else:
         offset, field = None, problem.field
-        if temperature or initial or heat is not None:
-            offset = problem.model.stress_offset(temperature, initial, field, heat)
+        if factors["temperature"] or factors["initial"] or heat is not None:
+            offset = problem.model.stress_offset(factors["temperature"], factors["initial"], field, heat)
         materials = field.moduli, field.moduli_rows, u, field.treatment
         stress = nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
     by_material = None

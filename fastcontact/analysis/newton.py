@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,7 @@ from fastcontact.arrays import Array, largest
 from fastcontact.elasticity.nonlinear_bodies import COMPLETE
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.choice import MAX_TOLERANCE
-from fastcontact.linear.protocol import TOLERANCE, Loaded
+from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
@@ -85,9 +84,10 @@ def _equilibrium_of_linear_bodies(
     problem, start, u, settled = begin.problem, begin.state, begin.state.u, None
     iterate = Iterate.of(start) if before is None or before.settled is None else before.settled.iterate
     while True:
-        loaded = begin.loaded if load is begin.load and settled is None else with_loads(problem, load)
-        settled = _contact(begin, load, loaded, iterate)
-        u, contact_force = solve_displacements(problem, load, loaded, settled, u)
+        unchanged = load is begin.load and settled is None
+        step = begin if unchanged else replace(begin, load=load, loaded=with_loads(problem, load))
+        settled = settle_geometry(step, iterate)
+        u, contact_force = solve_displacements(step, settled, u)
         force = problem.system.K @ u
         internal = force, (0.5 * float(u @ force), 0.0)
         force_balance = balance(problem, u, contact_force, load.force, start.largest_force, internal)
@@ -97,23 +97,6 @@ def _equilibrium_of_linear_bodies(
             if force_balance.residual > force_balance.bound:
                 raise force_balance.failure(begin.index, problem, iterate.history)
             return StepEquilibrium(settled, u, force_balance)
-
-
-def _contact(
-    step: StepContext, load: StepLoad, loaded: Loaded, iterate: Iterate, paired: SettledContact | None = None
-) -> SettledContact | None:
-    """Return the contact of a problem whose terms are linear; None without contact pairs.
-
-    `step` contains the problem, and `loaded` is its matrix with the right-hand side of `load`. `iterate` and `paired` are
-    those of `settle_geometry`.
-    """
-    problem, u, bodies = step.problem, iterate.u, step.problem.floating_bodies
-    if not problem.pairs:
-        return None
-    lift = load.lift if bodies is None else load.lift + bodies.rigid(u[bodies.dofs])
-    condensed_size = problem.dofs.largest_condensed(u, lift)
-    condensed = replace(step, load=load, loaded=loaded.condensed(), dofs=problem.dofs, condensed_size=condensed_size)
-    return settle_geometry(condensed, iterate, paired)
 
 
 @dataclass(frozen=True)
@@ -158,10 +141,7 @@ class _Newton:
         self._moved_fully = False  # whether displacements are those of the last contact solution
         self._regularisation = Regularisation()  # of the last tangent
         self._replaces = bool(begin.problem.force_driven.pairs)  # see `Regularisation.replaces`
-
-    @cached_property
-    def _mixing(self) -> Anderson:
-        return Anderson(DEPTH, np.arange(len(self._start.u)))
+        self._mixing = Anderson(DEPTH, np.arange(len(begin.state.u)))
 
     def equilibrium_from(self, origin: Array) -> StepEquilibrium:
         """Return the equilibrium, by iterations that begin at the displacements `origin` (n_dofs,) [length]."""
@@ -183,7 +163,13 @@ class _Newton:
                 force_balance = self._force_balance(u, contact_force, before) if fraction < 1.0 else force_balance
             change = largest(u - before)
             changes.append(self._relative(change, u))
-            history.append(_history_entry(self._iterate, changes[-1], force_balance, fraction))
+            pairings = self._iterate.history
+            history.append({
+                "displacement_change": changes[-1], "residual": force_balance.relative, "pairings": len(pairings),
+                "active": pairings[-1]["active"] if pairings else 0,
+                "active_set_iterations": sum(entry["active_set_iterations"] for entry in pairings),
+                **({} if fraction == 1.0 else {"damped": fraction}),
+            })  # fmt: skip
             small = self._has_converged(changes) or change <= self._start.gap_round_off
             if fraction == 1.0 and force_balance.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, force_balance, self._terms, history)
@@ -327,12 +313,13 @@ class _Newton:
         self._linear_tolerance = self._forcing(problem, load, u, unbalanced)
         # The contact geometry is iterated no further than the linearisation of the bodies is accurate.
         tolerance = min(max(problem.criteria.geometry, MAX_TOLERANCE * changes[-1]), NOTABLE)
-        inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
-        loaded = with_loads(problem, load)
-        step = replace(self._begin, problem=inner_problem, extrapolation=Extrapolation())
+        step = replace(
+            self._begin, problem=replace(problem, criteria=replace(problem.criteria, geometry=tolerance)), load=load,
+            state=replace(self._start, extrapolation=Extrapolation()), loaded=with_loads(problem, load),
+        )  # fmt: skip
         paired = self._settled if self._moved_fully and problem.linearised_at is None else None
-        settled = _contact(step, load, loaded, iterate, paired)
-        solution = solve_displacements(problem, load, loaded, settled, u, self._linear_tolerance)
+        settled = settle_geometry(step, iterate, paired)
+        solution = solve_displacements(step, settled, u, self._linear_tolerance)
         self._settled = settled
         self._reusable = problem if regularisation.geometric == COMPLETE else None
         return solution
@@ -427,14 +414,3 @@ class _Newton:
             target = u + fraction * change
             slope_at_end = slope(target)
         return target, fraction
-
-
-def _history_entry(iterate: Iterate, change: float, force_balance: Balance, fraction: float) -> dict[str, Any]:
-    """Return the entry of the history for an iteration."""
-    pairings = iterate.history
-    return {
-        "displacement_change": change, "residual": force_balance.relative, "pairings": len(pairings),
-        "active": pairings[-1]["active"] if pairings else 0,
-        "active_set_iterations": sum(entry["active_set_iterations"] for entry in pairings),
-        **({} if fraction == 1.0 else {"damped": fraction}),
-    }  # fmt: skip

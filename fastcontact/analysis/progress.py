@@ -43,9 +43,7 @@ class StatusLine:
 
     def close(self) -> None:
         """Clear the line."""
-        if self._show:
-            sys.stderr.write("\r" + " " * self._width + "\r")
-            sys.stderr.flush()
+        self.draw("")
 
 
 class Progress(StatusLine):

@@ -14,15 +14,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.analysis.solution import Solution
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
+from fastcontact.linear.sparse_rows import scaled
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -66,22 +67,21 @@ class SharedNodes:
         redundant[self.behind] = True
         return redundant
 
-    def closed(self, active: Mask) -> Mask:
-        """Return which constraints (m,) represent at least one active constraint, given the active ones (m,)."""
-        return np.asarray(self.summed(active) > 0)
+    @cached_property
+    def _sums(self) -> csr_array:
+        """Matrix (m, m) of ones that sums values over the constraints of each representative."""
+        m = len(self.representative)
+        return csr_array((np.ones(m), (self.representative, np.arange(m))), shape=(m, m))
 
-    def summed(self, values: NDArray[np.generic]) -> Array:
+    def summed(self, values: AnyArray) -> Array:
         """Return the sums (m, ...) of values (m, ...) over the constraints of each representative."""
-        total = np.zeros(values.shape)
-        np.add.at(total, self.representative, values.astype(float))
-        return total
+        return np.asarray(self._sums @ values)
 
     def merged_constraints(self, constraints: StackedConstraints) -> Constraints:
         """Return the constraints of the representatives alone, each with the area of all constraints it represents."""
-        mean = self._summation(self.normal_fraction)
         merged = {
-            "B": csr_array(mean @ constraints.B),
-            "gap0": mean @ constraints.gap0,
+            "B": csr_array(self._sums @ scaled(constraints.B, self.normal_fraction)),
+            "gap0": self.summed(self.normal_fraction * constraints.gap0),
             "tangents": self._tangents(constraints),
             "equality": constraints.equality & ~self.redundant,
             "slip0": self._mean(constraints.slip0.T, self.tangential_fraction).T,
@@ -97,16 +97,14 @@ class SharedNodes:
             merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
         return replace(constraints, **merged).without(self.redundant)  # type: ignore[arg-type]
 
-    def _summation(self, weight: Array) -> csr_array:
-        """Return the matrix (m, m) that sums values with weights (m,) for each representative."""
-        m = len(weight)
-        return csr_array((weight, (self.representative, np.arange(m))), shape=(m, m))
-
     def _tangents(self, constraints: Constraints) -> tuple[csr_array, ...]:
         """Return the rows (m, n_dofs) of the mean slip of each representative along its own tangents."""
-        products = np.einsum("mjd,mkd->jkm", self.frame, self.frame[self.representative])
-        sums = [[self._summation(self.tangential_fraction * factor) for factor in factors] for factors in products]
-        return tuple(csr_array(sum(M @ T for M, T in zip(matrices, constraints.tangents))) for matrices in zip(*sums))
+        products = np.einsum("mjd,mkd->kjm", self.frame, self.frame[self.representative]) * self.tangential_fraction
+        tangents = constraints.tangents
+        return tuple(
+            csr_array(sum(self._sums @ scaled(T, factor) for factor, T in zip(factors, tangents)))
+            for factors in products
+        )
 
     def _mean(self, components: Array, weight: Array) -> Array:
         """Return the weighted means (m, k) of vectors over the constraints of each representative.
@@ -119,7 +117,7 @@ class SharedNodes:
     def merged_gaps(self, gaps: Array) -> Array:
         """Return the mean gaps and slips (1 + k, m) of representatives, given those of all constraints [length]."""
         slips = self._mean(gaps[1:].T, self.tangential_fraction).T
-        return np.vstack([self._summation(self.normal_fraction) @ gaps[0], slips])
+        return np.vstack([self.summed(self.normal_fraction * gaps[0]), slips])
 
     def of_representatives(
         self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
@@ -133,7 +131,7 @@ class SharedNodes:
         weighted = (traction, np.ones(len(gap))), (closing, self.tangential_fraction)
         means = (self._mean(np.einsum("md,mkd->mk", vectors, tangents), weight) for vectors, weight in weighted)
         forces, slips = (np.einsum("mk,mkd->md", along, tangents) for along in means)
-        return self._summation(self.normal_fraction) @ gap, self.summed(normal), forces, slips
+        return self.summed(self.normal_fraction * gap), self.summed(normal), forces, slips
 
     def with_distributed_forces(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
         """Return a solution of `merged_constraints` at `u` (n_dofs,) [length] with forces distributed to all constraints."""

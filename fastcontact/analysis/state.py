@@ -16,12 +16,15 @@ from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 
-# Keys of restart data, with the attributes of `State` that they store: data of each contact pair, and numbers.
+# Keys of restart data, with the attributes of `State` that they store: data of each contact pair, and numbers. Then the
+# attributes that are stored under their names: those with arrays, and those with instances of a class.
 PAIR_DATA = {
     "closed": "never_opening", "now": "obstacles", "first_contact": "first_contact", "elastic_slip": "elastic_slip",
     "angle": "angles", "slipped": "slipped", "worn": "worn",
 }  # fmt: skip
 NUMBERS = {"largest_force": "largest_force", "largest_work": "largest_rigid_force", "round_off": "gap_round_off"}
+ARRAYS = ("locked", "history", "active", "pressure")
+CLASSES: dict[str, type[Bond | ContactForces]] = {"bonds": Bond, "forces": ContactForces}
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,17 +137,16 @@ class State:
             "numbers": {**{key: float(getattr(self, name)) for key, name in NUMBERS.items()}, "halved": self.halved},
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
-            "locked": dict(self.locked),
-            "bonds": {name: vars(entry) for name, entry in self.bonds.items()},
             "work": None if self.work is None else dataclasses.asdict(self.work),
-            "forces": {name: vars(entry) for name, entry in self.forces.items()},
-            "history": dict(self.history),
             "flow": list(self.flow),
             **({} if self.rise is None else {"rise": self.rise.copy(), "instant": self.instant}),
-            "active": dict(self.active),
-            "pressure": dict(self.pressure),
+            **{name: dict(getattr(self, name)) for name in ARRAYS},
+            **{name: {pair: vars(data) for pair, data in getattr(self, name).items()} for name in CLASSES},
             "pairs": {
-                pair: {key: _as_list(getattr(self, name).get(pair)) for key, name in PAIR_DATA.items()}
+                pair: {
+                    key: list(value) if isinstance(value := getattr(self, name).get(pair), tuple) else value
+                    for key, name in PAIR_DATA.items()
+                }
                 for pair in self.active
             },
             "extrapolation": self.extrapolation.to_dict(),
@@ -170,33 +172,25 @@ class State:
             name: {pair: _from_list(key, entry[key]) for pair, entry in pairs.items() if entry.get(key) is not None}
             for key, name in PAIR_DATA.items()
         }
+        pair_data |= {name: dict(data.get(name, {})) for name in ARRAYS}
+        for name, kind in CLASSES.items():
+            pair_data[name] = {pair: kind(**entry) for pair, entry in data.get(name, {}).items()}
         return cls(
             u,
             **{name: numbers[key] for key, name in NUMBERS.items()},
             **pair_data,
-            history=dict(data.get("history", {})),
             flow=tuple(data.get("flow", (0.0, 0.0))),
             rise=data.get("rise"),
             instant=data.get("instant", 0.0),
             halved=int(numbers.get("halved", 0)),
-            active=dict(data["active"]),
-            pressure=dict(data["pressure"]),
-            locked=dict(data.get("locked", {})),
-            bonds={name: Bond(**entry) for name, entry in data.get("bonds", {}).items()},
             work=Work(**data["work"]) if data.get("work") else None,
-            forces={name: ContactForces(**entry) for name, entry in data.get("forces", {}).items()},
             extrapolation=Extrapolation() if extrapolation is None else Extrapolation.from_dict(extrapolation, u),
             touched=touched.union(data.get("touched", ())),
         )
 
 
-def _as_list(value: Any) -> Any:
-    """Return the value of an attribute as a list if it is a tuple, such as a `Worn`, and unchanged otherwise."""
-    return list(value) if isinstance(value, tuple) else value
-
-
 def _from_list(key: str, value: Any) -> Any:
-    """Return the value of an attribute, given what `_as_list` returned for it and its key in `PAIR_DATA`."""
+    """Return the value of an attribute, given its key in `PAIR_DATA` and the stored value, a list for tuples."""
     if key == "worn":
         return Worn(*value)
     return tuple(value) if isinstance(value, list) else value

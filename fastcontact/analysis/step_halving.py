@@ -17,9 +17,9 @@ from fastcontact.analysis.convergence_messages import friction_used, limit_load
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.load_step import load_step, prepare_start
 from fastcontact.analysis.newton import newton
-from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
-from fastcontact.arrays import Array, largest
+from fastcontact.arrays import largest
 from fastcontact.errors import ConvergenceError
 from fastcontact.model.checks import facet_lengths
 from fastcontact.results.step import StepResult
@@ -58,14 +58,11 @@ def _begins_loaded(problem: Problem, begin: float, end: float) -> bool:
     """Return whether loads act at the beginning of the first step that change in it, and friction depends on their order."""
     if not any(pair.friction and pair.options.kind != "tied" for pair in problem.pairs.values()):
         return False
-    before, after = (_values(problem.load_at(instant)) for instant in (begin, end))
-    return bool(before.any()) and not np.array_equal(before, after)
-
-
-def _values(load: StepLoad) -> Array:
-    """Return the values of all loads in one array, some of displacements and some of forces."""
-    others = [*load.obstacles.values(), [*load.angles.values()], [*load.fluids.values()], load.following]
-    return np.concatenate([load.lift, load.force, *others, *([] if load.rise is None else [load.rise])])
+    values = []  # of all loads, some of them displacements and some forces
+    for load in map(problem.load_at, (begin, end)):
+        others = [*load.obstacles.values(), [*load.angles.values()], [*load.fluids.values()], load.following]
+        values.append(np.concatenate([load.lift, load.force, *others, [] if load.rise is None else load.rise]))
+    return bool(values[0].any()) and not np.array_equal(values[0], values[1])
 
 
 def _substeps(

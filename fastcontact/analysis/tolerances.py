@@ -13,7 +13,6 @@ window then differ by hardly more than one change.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -100,22 +99,6 @@ class Tolerances:
         return max(max(self._criteria.geometry, relative_error) * size, self._round_off)
 
 
-@dataclass(frozen=True)
-class Scatter:
-    """Scatter of the last iterates of a geometry loop.
-
-    Attributes
-    ----------
-    displacement : float
-        Scatter of displacements, relative to the largest one [-].
-    force : float
-        Scatter of nodal contact forces, relative to the largest one [-].
-    """
-
-    displacement: float
-    force: float
-
-
 class ScatterWindow:
     """The last displacements and contact forces of a geometry loop, which show whether they only scatter by round-off."""
 
@@ -124,7 +107,7 @@ class ScatterWindow:
 
     def add(
         self, displacement: Array, force: Array, change: float, size: float, contraction: float = np.inf
-    ) -> Scatter | None:
+    ) -> dict[str, float] | None:
         """Add an update to the window, and return the scatter of the window.
 
         Parameters
@@ -143,8 +126,9 @@ class ScatterWindow:
 
         Returns
         -------
-        Scatter or None
-            None if the updates may still converge, or if they scatter by more than is acceptable.
+        dict or None
+            Scatter of the displacements, ``displacement``, and of the nodal contact forces, ``force``, each relative to the
+            largest one [-]. None if the updates may still converge, or if they scatter by more than is acceptable.
         """
         if not change <= SINGLE_PRECISION * size:
             self._window.clear()
@@ -155,12 +139,12 @@ class ScatterWindow:
         if len(self._window) < window:
             return None
         (displacements, forces, changes), half = zip(*list(self._window)[-window:], strict=True), window // 2
-        scatter = Scatter(_spread(displacements) / size, _spread(forces) / (largest(force) or 1.0))
+        scatter = {"displacement": _spread(displacements) / size, "force": _spread(forces) / (largest(force) or 1.0)}
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
         # Displacements that move in one direction are about `window` changes apart, those that oscillate about one change.
-        if declining or scatter.displacement * size > half * float(np.median(changes)):
+        if declining or scatter["displacement"] * size > half * float(np.median(changes)):
             return None
-        acceptable = scatter.displacement <= SINGLE_PRECISION and scatter.force <= 100 * SINGLE_PRECISION
+        acceptable = scatter["displacement"] <= SINGLE_PRECISION and scatter["force"] <= 100 * SINGLE_PRECISION
         return scatter if acceptable else None
 
 

@@ -187,7 +187,7 @@ def contact_work(
     no_tangents = np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
     directions = np.stack(constraints.directions, axis=1) if k else no_tangents
     force, slips = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
-    after = _forces(pair, constraints, normal, tangents, force, contact, _added_gaps(pair, configuration, contact))
+    after = _forces(pair, configuration, constraints, normal, tangents, force, contact)
     if before is None:  # no forces before the first step
         before = replace(
             after, positions=after.positions[:0], rows=(np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)),
@@ -246,7 +246,11 @@ def _frictional_work(
     (normal_before, normal), mu = normals, constraints.friction
     work_at_begin, work_at_end = (-0.5 * np.einsum("md,md->m", forces, slips) for forces in tangential)
     ratio = np.divide(normal_before, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
-    moved, moved_away = _moved(normal, normal_before)
+    # A contact that moves over a surface leaves as much force behind as it gains ahead. Such a force acts during the complete
+    # step. These are the parts of the increase and of the decrease that compensate each other.
+    changes = normal - normal_before, normal_before - normal
+    increase, decrease = (float(np.maximum(change, 0.0).sum()) for change in changes)
+    moved, moved_away = (change / max(increase, decrease, TINY) for change in (decrease, increase))
     # The work of all increments, in which constraints carry no force before they close.
     if integrals is not None:
         work, mean_force = integrals
@@ -281,26 +285,16 @@ def _closing(pair: Formulation, configuration: Configuration, constraints: Const
     return candidates & was_open[nearest(pair.points[pair.secondary.points[facing]], constraints.positions)[1]]
 
 
-def _moved(normal: Array, before: Array) -> tuple[float, float]:
-    """Return the parts of the increase and of the decrease of normal forces that compensate each other, between 0 and 1.
-
-    `before` and `normal` are the forces (m,) at the beginning and at the end of the step [force]. A contact that moves over
-    a surface leaves as much force behind as it gains ahead. Such a force acts during the complete step.
-    """
-    increase, decrease = (float(np.maximum(change, 0.0).sum()) for change in (normal - before, before - normal))
-    largest = max(increase, decrease, TINY)
-    return decrease / largest, increase / largest
-
-
 def _forces(
-    pair: Formulation, constraints: Constraints, normal: Array, tangents: Array, force: Array, contact: ContactResult,
-    added: Array,
+    pair: Formulation, configuration: Configuration, constraints: Constraints, normal: Array, tangents: Array,
+    force: Array, contact: ContactResult,
 ) -> ContactForces:  # fmt: skip
     """Return the contact forces of a pair at the end of a step.
 
     Parameters
     ----------
     pair : Formulation
+    configuration : Configuration
     constraints : Constraints
     normal : ndarray (m,)
         Normal forces [force].
@@ -309,8 +303,6 @@ def _forces(
     force : ndarray (m, dim)
         Tangential forces as vectors [force].
     contact : ContactResult
-    added : ndarray (n_nodes,)
-        See `ContactForces.added`.
     """
     size, dim = pair.points.size, contact.coordinates.shape[1]
     rows = csr_array(diags_array(normal) @ constraints.B)[:, :size]
@@ -329,17 +321,12 @@ def _forces(
     stored = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
     all_forces = np.column_stack([normal, tangents]).T
     amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
+    added = np.zeros(len(contact.gap))
+    if pair.options.clearance is not None or configuration.worn is not None:
+        gap_alone = pair.nodal_gap(configuration, with_clearance=False)[0]
+        np.subtract(contact.gap, gap_alone, out=added, where=np.isfinite(gap_alone) & np.isfinite(contact.gap))
     return ContactForces(
         constraints.positions, normal * inverse_area, force * inverse_area[:, None], penetration * normal,
         (rows.data, rows.indices, rows.indptr), nodal_forces.reshape(-1, dim),
         np.einsum("nd,nd->n", force_vectors, normals), added, 0.5 * (stored + float((amplitudes**2).sum())),
     )  # fmt: skip
-
-
-def _added_gaps(pair: Formulation, configuration: Configuration, contact: ContactResult) -> Array:
-    """Return the contribution of clearances and wear to the gaps (n_nodes,) of the secondary nodes [length]."""
-    if pair.options.clearance is None and configuration.worn is None:
-        return np.zeros(len(contact.gap))
-    gap_alone = pair.nodal_gap(configuration, with_clearance=False)[0]
-    known = np.isfinite(gap_alone) & np.isfinite(contact.gap)
-    return np.subtract(contact.gap, gap_alone, out=np.zeros_like(gap_alone), where=known)

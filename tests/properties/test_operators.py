@@ -98,7 +98,7 @@ def test_the_multigrid_cycle_is_symmetric_and_positive(recipe, tied, seed):
             return
         assert elimination is not None  # without, the bounds of its smoothers are sure
         assert raised < MAX_RAISES
-        amg.hierarchy.raise_bounds(BOUND_FACTOR)
+        amg.hierarchy.bounds = [BOUND_FACTOR * bound for bound in amg.hierarchy.bounds]
 
 
 def applied(amg, basis):

@@ -6,7 +6,7 @@ from models import elastic_model, supported, united
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis import touching
+from fastcontact.analysis import friction_increments
 from fastcontact.analysis.result_warnings import _slip_before_contact
 from fastcontact.analysis.state import State
 from fastcontact.analysis.work import Work
@@ -293,10 +293,10 @@ def test_increments_of_friction_are_those_of_the_converged_geometry(formulation,
     model.add_obstacle("drum", secondary="BOTTOM", obstacle=drum, friction=0.3, formulation=formulation)
 
     def solved(tolerance):
-        monkeypatch.setattr(touching, "SINGLE_PRECISION", tolerance)
+        monkeypatch.setattr(friction_increments, "SINGLE_PRECISION", tolerance)
         return fc.solve(model, 1)[-1]
 
-    step, exact, rough = solved(touching.SINGLE_PRECISION), solved(1e-10), solved(1.0)
+    step, exact, rough = solved(friction_increments.SINGLE_PRECISION), solved(1e-10), solved(1.0)
     size = np.abs(exact.displacement).max()
     assert np.abs(step.displacement - exact.displacement).max() < 1e-6 * size
     assert np.abs(rough.displacement - exact.displacement).max() > 1e-4 * size

@@ -251,6 +251,11 @@ def aligning_rotation(compliance: Array, directions: tuple[Array, ...] = ()) -> 
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
 
 
+def rotated(Q: csr_array, values: Array) -> Array:
+    """Return the product of Q ((1 + k) m, (1 + k) m) with values (1 + k, m) along normals and tangents."""
+    return np.asarray(Q @ values.ravel()).reshape(values.shape)
+
+
 def _angles_to_axes(tangent: Array, second_tangent: Array) -> Array:
     """Return angles (m,) by which the tangents (m, 3) rotate until the first is perpendicular to a coordinate axis [rad].
 

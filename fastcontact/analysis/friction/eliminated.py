@@ -45,8 +45,8 @@ LAW_TOLERANCE, ACCEPTABLE = 10.0, 300.0
 def solve(
     loaded: LoadedNonsymmetric, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array,
     forces: Array | None,
-) -> tuple[Array, Forces] | None:  # fmt: skip
-    """Return the unknowns (n,) [length] and the contact forces, or None if the method fails.
+) -> tuple[Array, Forces]:  # fmt: skip
+    """Return the unknowns (n,) [length] and the contact forces.
 
     Parameters
     ----------
@@ -63,33 +63,35 @@ def solve(
         Initial guess of the unknowns [length].
     forces : ndarray (1 + k, m), optional
         Initial guess of the forces: normal ones, then those along each of k tangents [force].
+
+    Raises
+    ------
+    ConvergenceError
+        If the method fails.
     """
     tolerance = accuracy.residual or 0.0
     problem = Eliminated(loaded, constraints, u, tolerance, inexact=not accuracy.inexact)
     y, gaps = problem.start(forces)
-    try:
-        if forces is None or not forces.any():
-            sticking = closed if closed.any() else gaps[0] < 0.0
-            state = sticking | constraints.equality, sticking
-        else:
-            state = problem.law.state(y, gaps)
-        # At least one step is necessary, because initial forces and displacements are not in equilibrium.
-        y, gaps = problem.step(y, gaps, *state)
-        if not state[0].any():  # if all were open, close those that penetrate in the solution without contact
-            y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
-        exact = max(ROUND_OFF, LAW_TOLERANCE * tolerance)
-        iterate = cone_newton.newton(problem, y, gaps, exact, 0 if accuracy.inexact else None)
-        if problem.finish():
-            y, gaps = problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
-            iterate = cone_newton.newton(problem, y, gaps, exact)
-        if not (accuracy.inexact or iterate.settled):
-            iterate = replace(iterate, settled=iterate.residual <= ACCEPTABLE * tolerance)
-            if not iterate.settled:
-                return None
-        if iterate.y is not problem.last_forces:  # after a damped step, for which no displacements were computed
-            problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
-    except ConvergenceError:
-        return None
+    if forces is None or not forces.any():
+        sticking = closed if closed.any() else gaps[0] < 0.0
+        state = sticking | constraints.equality, sticking
+    else:
+        state = problem.law.state(y, gaps)
+    # At least one step is necessary, because initial forces and displacements are not in equilibrium.
+    y, gaps = problem.step(y, gaps, *state)
+    if not state[0].any():  # if all were open, close those that penetrate in the solution without contact
+        y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
+    exact = max(ROUND_OFF, LAW_TOLERANCE * tolerance)
+    iterate = cone_newton.newton(problem, y, gaps, exact, 0 if accuracy.inexact else None)
+    if problem.finish():
+        y, gaps = problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
+        iterate = cone_newton.newton(problem, y, gaps, exact)
+    if not (accuracy.inexact or iterate.settled):
+        iterate = replace(iterate, settled=iterate.residual <= ACCEPTABLE * tolerance)
+        if not iterate.settled:
+            raise ConvergenceError("friction: the iteration on eliminated constraints did not converge")
+    if iterate.y is not problem.last_forces:  # after a damped step, for which no displacements were computed
+        problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
     return problem.u, problem.unscaled(iterate)
 
 
@@ -123,7 +125,7 @@ class Eliminated:
         if self._rotation is not None:
             rotated_rows = csr_array(self._rotation @ vstack(rows, format="csr"))
             rows = tuple(rotated_rows[a * m : (a + 1) * m] for a in range(3))
-            free = (self._rotation @ free.ravel()).reshape(free.shape)
+            free = cone_newton.rotated(self._rotation, free)
             compliance = self._compliance_of_rows(rows, unknown_compliance)
         held_slips = cone_newton.held_tangents(compliance)
         prescribed = held_slips & constraints.moved_past(np.arange(m), self._rotation)
@@ -152,7 +154,7 @@ class Eliminated:
         """Return scaled forces and gaps (1 + k, m) at the initial unknowns, given initial `forces` (1 + k, m) [force]."""
         y = np.zeros_like(self._free) if forces is None else np.where(self._usable, forces, 0.0)
         if self._rotation is not None:
-            y = (self._rotation @ y.ravel()).reshape(y.shape)
+            y = cone_newton.rotated(self._rotation, y)
         y[1:][~self._free_slips] = 0.0
         self.last_forces = y / self._unit
         return self.last_forces, self._scaled(self._gaps(self.u, y))
@@ -165,7 +167,7 @@ class Eliminated:
         y = self.last_forces * self._unit
         gaps = self._gaps(self.u, y)
         if self._rotation is not None:
-            y, gaps = ((self._rotation.T @ values.ravel()).reshape(values.shape) for values in (y, gaps))
+            y, gaps = (cone_newton.rotated(self._rotation.T, values) for values in (y, gaps))
         return Forces(y, gaps, scaled.closed, scaled.sticking, scaled.settled, scaled.residual, 1 + scaled.iterations)
 
     def _gaps(self, u: Array, forces: Array | float = 0.0) -> Array:

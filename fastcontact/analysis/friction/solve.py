@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
@@ -25,6 +24,7 @@ from fastcontact.analysis.friction.cone_newton import (
     aligning_rotation,
     compliance_of_each,
     held_tangents,
+    rotated,
 )
 from fastcontact.analysis.solution import Accuracy, Forces, Path, SlipSoFar, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
@@ -96,10 +96,7 @@ def _eliminated(
 
     def solve_eliminated(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> Forces:
         nonlocal u
-        solution = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
-        if solution is None:
-            raise ConvergenceError("friction: the iteration on eliminated constraints did not converge")
-        u, result = solution
+        u, result = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
         result.gaps[:, ~usable] = 0.0
         return result
 
@@ -116,7 +113,11 @@ def _eliminated(
             result = solve_eliminated(constraints, closed, accuracy, forces)
         else:
             y, closing = path.along(constraints.directions, np.arange(len(constraints)))
-            lag = _lag(loaded, constraints, path, y)
+            end = loaded.full_solution(constraints.force(y[0], y[1:].T))
+            lag = -constraints.gaps_at_rest() - np.stack([R @ end for R in (constraints.B, *constraints.tangents)])
+            lag -= eliminated.diagonal_compliance(constraints) * y
+            lag[0] += path.gap
+            lag = np.where(usable, lag, 0.0)
             distance = 4.0 * float(np.abs(lag[0]).max())  # further than constraints can close
             result, gaps, before = in_increments(lag, closing, y, path.waiting, increment)
             result = replace(result, gaps=gaps)
@@ -128,15 +129,6 @@ def _eliminated(
         result.sticking, result.residual, constraints.directions,
         slip_so_far=None if before is None else _slip_so_far(before, None, np.arange(len(constraints)), constraints),
     )  # fmt: skip
-
-
-def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Array:
-    """Return the argument `lag` (1 + k, m) of `in_increments`, given the forces y (1 + k, m) at the beginning of the step."""
-    end = loaded.full_solution(constraints.force(y[0], y[1:].T))
-    lag = -constraints.gaps_at_rest() - np.stack([R @ end for R in (constraints.B, *constraints.tangents)])
-    lag -= eliminated.diagonal_compliance(constraints) * y
-    lag[0] += path.gap
-    return np.where(constraints.usable, lag, 0.0)
 
 
 def _with_included(
@@ -169,8 +161,8 @@ def _with_included(
         y0, closing = path.along(constraints.directions, rows)
     if Q is not None:
         F = np.asarray(Q @ (Q @ F).T)
-        free, y0, closing = ((Q @ values.ravel()).reshape(free.shape) for values in (free, y0, closing))
-        guess = None if guess is None else (Q @ guess.ravel()).reshape(free.shape)
+        free, y0, closing = (rotated(Q, values) for values in (free, y0, closing))
+        guess = None if guess is None else rotated(Q, guess)
     if len(held_rows):
         prescribed = held_slips & constraints.moved_past(rows, Q)
         F[held_rows], F[:, held_rows] = 0.0, 0.0
@@ -184,11 +176,21 @@ def _with_included(
     else:
         lag = -free - (F @ y0.ravel()).reshape(free.shape)
         lag[0] += closing[0]
-        increment = partial(_increment, F, free, mu, equations)
+
+        def increment(offset: Array, carrying: Mask, closed: Mask, start: Array | None) -> Forces:
+            gaps, at = free + offset, np.flatnonzero(carrying)
+            unknown = (np.arange(1 + k)[:, None] * len(rows) + at).ravel()
+            start = None if start is None else start[:, at]
+            result = dense.solve(F[np.ix_(unknown, unknown)], gaps[:, at], mu[at], closed[at], start, equations[at])
+            y, (closed, sticking) = np.zeros_like(gaps), np.zeros((2, len(rows)), bool)
+            y[:, at], closed[at], sticking[at] = result.y, result.closed, result.sticking
+            gaps += (F[:, unknown] @ result.y.ravel()).reshape(gaps.shape)
+            return replace(result, y=y, gaps=gaps, closed=closed, sticking=sticking)
+
         result, gaps_of_included, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
     y = result.y
     if Q is not None:
-        y, gaps_of_included = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ gaps_of_included.ravel()).reshape(y.shape)
+        y, gaps_of_included = rotated(Q.T, y), rotated(Q.T, gaps_of_included)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
     all_forces = np.zeros((1 + k, m))
     gaps = gaps_at_rest + (all_rows @ u).reshape(1 + k, m)
@@ -227,14 +229,13 @@ def _slip_so_far(
         All m constraints.
     """
     *components, integrals, normal, begin = before
+    if Q is not None:
+        no_gaps = np.zeros((1, len(rows)))
+        components = [rotated(Q.T, np.vstack([no_gaps, along]))[1:] for along in components]
     m, dim = constraints.positions.shape
     all_vectors, all_integrals, all_normal = np.zeros((3, m, dim)), np.zeros((2, m)), np.zeros(m)
-    for vectors, along in zip(all_vectors, components, strict=True):
-        unrotated = along
-        if Q is not None:
-            unrotated = (Q.T @ np.vstack([np.zeros(len(rows)), along]).ravel()).reshape(-1, len(rows))[1:]
-        tangents = np.stack([tangent[rows] for tangent in constraints.directions])
-        vectors[rows] = np.einsum("km,kmd->md", unrotated, tangents)
+    tangents = np.stack(constraints.directions)[:, rows]
+    all_vectors[:, rows] = np.einsum("pkm,kmd->pmd", np.stack(components), tangents)
     all_integrals[:, rows], all_normal[rows] = integrals, normal
     slip, slip_before_closing, traction = all_vectors
     return SlipSoFar(slip, slip_before_closing, traction, all_integrals, all_normal, begin)
@@ -255,19 +256,3 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
         F += Z @ Z.T
     F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
-
-
-def _increment(
-    F: Array, free: Array, mu: Array, equality: Mask, offset: Array, carrying: Mask, closed: Mask, start: Array | None
-) -> Forces:
-    """Return the solution of `dense.solve` if only the constraints `carrying` (m,) carry forces; see `Increment`."""
-    free, rows = free + offset, np.flatnonzero(carrying)
-    unknown = (np.arange(len(free))[:, None] * len(carrying) + rows).ravel()
-    start = None if start is None else start[:, rows]
-    result = dense.solve(F[np.ix_(unknown, unknown)], free[:, rows], mu[rows], closed[rows], start, equality[rows])
-    y = np.zeros_like(free)
-    y[:, rows] = result.y
-    closed_of_all, sticking = np.zeros((2, len(carrying)), bool)
-    closed_of_all[rows], sticking[rows] = result.closed, result.sticking
-    gaps = free + (F[:, unknown] @ result.y.ravel()).reshape(free.shape)
-    return replace(result, y=y, gaps=gaps, closed=closed_of_all, sticking=sticking)

@@ -96,7 +96,7 @@ class ConstrainedHierarchy:
         change = sum_of_changes(*(change.on_coarse(finest.P) for change in changes))
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
-                self.hierarchy.coarse.set(change.on_all_nodes(level.n))
+                self.hierarchy.coarse.set(change.on_nodes(np.arange(level.n // change.size)).tocsc())
                 return
             self._change_diagonal(level, change)
             level.change = change.rows(dtype)

@@ -159,10 +159,6 @@ class Hierarchy:
             level.bound = bound
         self._factors = [chebyshev(bound) for bound in values]
 
-    def raise_bounds(self, factor: float) -> None:
-        """Multiply the bounds of the smoothers by `factor`, until the next call of `set_bounds`."""
-        self.bounds = [factor * bound for bound in self.bounds]
-
     def set_bounds(self, estimated: bool = False) -> None:
         """Set the bounds of the smoothers to those without equations and springs.
 

@@ -94,27 +94,20 @@ class LoadedMultigrid(LoadedIteration):
             return monitor(u, parts.multiplier(u, multiplier, c), error)
 
         if isinstance(parts, _FieldParts) and parts.field.edge.any():
-            border = parts.border()
-            u, at_edge = self._bordered_solution(parts, border, f, guess, tolerance)
+            field, edge = parts.field, parts.field.edge
+            border = Border(csr_array(field.rows[edge]), field.right[edge], field.compliance)
+            start = np.zeros(parts.C.P.shape[1])
+            if guess is not None and len(self._at_edge) == len(start):
+                start = self._at_edge
+            arguments = f, elimination, springs, border, guess, start[field.edge_values] / field.units, tolerance
+            u, at_edge = solver.bordered_solution(*arguments)
+            self._at_edge = np.zeros(len(start))
+            self._at_edge[field.edge_values] = field.units * at_edge
             f = f + border.rows.T @ at_edge
         else:
             u = solver.solution(f, elimination, guess, monitor and check, tolerance, springs)
         multipliers = np.concatenate([solver.multiplier(elimination, u, f, springs), at_edge])
         return u, parts.multiplier(u, multipliers, c)
-
-    def _bordered_solution(
-        self, parts: _FieldParts, border: Border, f: Array, guess: Array | None, tolerance: float | None
-    ) -> tuple[Array, Array]:
-        """Return u (n,) [length] and the multipliers of the equations at the edge of the contact."""
-        field, start = parts.field, np.zeros(parts.C.P.shape[1])
-        if guess is not None and len(self._at_edge) == len(start):
-            start = self._at_edge
-        u, at_edge = self._solver.bordered_solution(
-            f, parts.elimination, parts.springs, border, guess, start[field.edge_values] / field.units, tolerance
-        )
-        self._at_edge = np.zeros(len(start))
-        self._at_edge[field.edge_values] = field.units * at_edge
-        return u, at_edge
 
     def _parts(
         self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, force_rows: csr_array | None = None
@@ -223,14 +216,10 @@ class _FieldParts(_Parts):
         field, elimination = C.of_field(B, c), None
         if not field.edge.all():
             rows = csr_array(field.rows[~field.edge])
-            elimination = eliminate(rows, field.right[~field.edge], None, _nodes_of_rows(rows, size), size)
+            nodes = abs(rows).argmax(axis=1).ravel() // size  # those of the largest entries
+            elimination = eliminate(rows, field.right[~field.edge], None, np.asarray(nodes, np.intp), size)
         springs = Springs(scaled(B, (C.stiffness > 0.0).astype(float)), C.stiffness)
         return cls(np.zeros(len(c), bool), elimination, springs, field, C)
-
-    def border(self) -> Border:
-        """Return the equations at the edge of the contact, which are not eliminated."""
-        field = self.field
-        return Border(csr_array(field.rows[field.edge]), field.right[field.edge], field.compliance)
 
     def multiplier(self, u: Array, eliminated: Array, c: Array) -> Array:
         """Return the forces (m,) at the points [force].
@@ -240,8 +229,3 @@ class _FieldParts(_Parts):
         p = np.empty(len(eliminated))
         p[np.argsort(self.field.edge, kind="stable")] = eliminated
         return self.C.weights * (self.field.P @ p) + super().multiplier(u, np.empty(0), c)
-
-
-def _nodes_of_rows(rows: csr_array, size: int) -> Indices:
-    """Return the node (m,) of the entry with the largest absolute value in each row; a node has `size` unknowns."""
-    return np.asarray(abs(rows).argmax(axis=1), np.intp).ravel() // size

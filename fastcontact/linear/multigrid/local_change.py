@@ -60,10 +60,6 @@ class LocalChange:
         product.sort_indices()
         return LocalChange(coarse_nodes, product)
 
-    def on_all_nodes(self, n: int) -> csc_array:
-        """Return the change as a matrix (n, n) of all unknowns."""
-        return self.on_nodes(np.arange(n // self.size)).tocsc()
-
     def on_nodes(self, nodes: Indices) -> bsr_array:
         """Return `blocks` with zero rows and columns added for `nodes` (l,), an ascending superset of the nodes."""
         index = np.searchsorted(nodes, self.nodes)

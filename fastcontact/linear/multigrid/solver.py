@@ -414,7 +414,7 @@ class Multigrid:
             self._build_anew()
             return
         if times < MAX_RAISES or self.precision == "double":
-            self.hierarchy.raise_bounds(BOUND_FACTOR)
+            self.hierarchy.bounds = [BOUND_FACTOR * bound for bound in self.hierarchy.bounds]
             return
         log.info("multigrid: single precision is insufficient for this matrix; the cycle continues in double precision")
         reduced = self._reduced

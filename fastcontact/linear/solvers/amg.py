@@ -28,7 +28,7 @@ from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import ReducedOperator
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid, StallError, TooManyIterationsError
-from fastcontact.linear.protocol import TOLERANCE, FrictionTerms, LinearSolver, Loaded, Product
+from fastcontact.linear.protocol import TOLERANCE, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
@@ -227,14 +227,11 @@ class _Loaded(LoadedMultigrid):
         """The factorisation with the same right-hand side."""
         return self._solver.replacement.load(self._f)
 
-    def solve_nonsymmetric(
-        self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
-        friction: FrictionTerms | None = None, C: Array | None = None,
-    ) -> tuple[Array, Array]:  # fmt: skip
+    def solve_nonsymmetric(self, *args: Any, **options: Any) -> tuple[Array, Array]:
         if self._solver.replacement is not None:
             raise ConvergenceError("with a factorisation, the friction problem is solved with the Delassus operator")
         try:
-            return super().solve_nonsymmetric(B, c, nodes, guess, tolerance, friction, C)
+            return super().solve_nonsymmetric(*args, **options)
         except StallError as stalled:
             self._solver.give_up(stalled)
             raise

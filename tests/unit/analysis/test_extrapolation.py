@@ -21,7 +21,7 @@ def after_two_steps(loads=(1.0, 2.0)):
 @pytest.mark.parametrize(("factor", "expected"), [(3.0, 3.0), (2.5, 2.5), (4.0, 4.0), (9.0, 2.0), (1.0, 2.0)])
 def test_displacements_go_on_with_the_loads_but_not_far_and_not_back(factor, expected):
     found = after_two_steps().to(np.zeros(3), factor * np.arange(3.0))
-    assert found.displacement(2.0 * np.ones(3)) == pytest.approx(expected * np.ones(3))
+    assert found.predicted(2.0 * np.ones(3), degree=1) == pytest.approx(expected * np.ones(3))
 
 
 def test_the_middle_of_a_step_is_on_a_parabola_or_on_a_line():
@@ -42,7 +42,7 @@ def test_constraints_close_and_open_where_gaps_and_forces_change_sign():
 def test_the_first_two_steps_start_from_the_last_state():
     found = Extrapolation().to(np.ones(2)).converged(np.ones(2), {}).to(2.0 * np.ones(2))
     u = np.ones(2)
-    assert found.displacement(u) is u
+    assert found.predicted(u, degree=1) is u
 
 
 def test_displacements_and_forces_are_each_compared_with_their_own():
@@ -81,11 +81,11 @@ def test_a_smooth_path_is_continued_by_polynomials_of_ascending_degree(loads):
         return np.array([1.0 + factor + 0.5 * factor**3, -(factor**2)])
 
     early = on_a_curve(loads[:2], path).to(np.full(2, loads[2]))
-    assert np.array_equal(early.predicted(path(loads[1])), early.displacement(path(loads[1])))  # a line
+    assert np.array_equal(early.predicted(path(loads[1])), early.predicted(path(loads[1]), degree=1))  # a line
     end = loads[-1] + 0.5
     found = on_a_curve(loads, path).to(np.full(2, end))
     assert found.predicted(path(loads[-1])) == pytest.approx(path(end), rel=1e-13)
-    assert found.displacement(path(loads[-1])) != pytest.approx(path(end), rel=1e-2)
+    assert found.predicted(path(loads[-1]), degree=1) != pytest.approx(path(end), rel=1e-2)
     again = Extrapolation.from_dict(on_a_curve(loads, path).to_dict(), path(loads[-1])).to(np.full(2, end))
     assert np.array_equal(again.predicted(path(loads[-1])), found.predicted(path(loads[-1])))
 

@@ -264,7 +264,8 @@ def test_a_strengthened_multigrid_cycle_is_remembered():
     analysis = Stepping(model, "amg", 1e-10, fc.Criteria(), ramp)
     analysis.step(1, 0.5)
     analysis.solver._strengthen(4)
-    analysis.solver.hierarchy.raise_bounds(1.3)
+    hierarchy = analysis.solver.hierarchy
+    hierarchy.bounds = [1.3 * bound for bound in hierarchy.bounds]
     memory = analysis.solver.snapshot()
     other = Stepping(model, "amg", 1e-10, fc.Criteria(), ramp)
     other.solver.put_back(memory)

@@ -29,8 +29,8 @@ def test_noise_is_found_soon_and_measured(level):
     parts = 1.0 + level * RNG.normal(size=(40, 20))
     k, found = watched(parts)
     assert WINDOW <= k <= 3 * WINDOW
-    assert level < found.displacement < 10 * level
-    assert found.force == 0.0
+    assert level < found["displacement"] < 10 * level
+    assert found["force"] == 0.0
 
 
 @pytest.mark.parametrize("rate", [0.5, 0.8, 0.9, 0.95, 0.99])

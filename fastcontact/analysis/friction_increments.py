@@ -21,7 +21,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
-class Touching:
+class FrictionIncrements:
     """Decision whether, and from which pairing on, friction of a load step is solved in increments; see `geometry_loop`.
 
     Parameters
@@ -39,7 +39,7 @@ class Touching:
     """
 
     def __init__(self, step: StepContext) -> None:
-        self._shear_limit = step.problem.friction_while_touching
+        self._step, self._shear_limit = step, step.problem.friction_while_touching
         self._near = NOTABLE if step.linearises_contact else 0.0
         self.due = self.unfinished = self._settled = False
         self._paired, self._shift = None, np.inf
@@ -47,42 +47,42 @@ class Touching:
     # Constraints of the last pairing that was solved in increments.
     _paired: StackedConstraints | None
 
-    def step(
-        self, step: StepContext, constraints: StackedConstraints, iterate: Iterate, nodes: SharedNodes | None
+    def with_path(
+        self, step: StepContext, constraints: StackedConstraints, u: Array, nodes: SharedNodes | None
     ) -> StepContext:
-        """Return the step in which a pairing is solved: with a `Path` if increments are due, otherwise unchanged."""
+        """Return the step in which a pairing at displacements u (n_dofs,) is solved.
+
+        It has a `Path` if increments are due, and is unchanged otherwise.
+        """
         self.unfinished = False
-        if not (self.due or self._outdated(step, constraints, iterate.u)):
+        if not (self.due or self._outdated(constraints, u)):
             return step
-        path = _path(step, constraints, iterate, nodes)
+        path = _path(step, constraints, nodes)
         self.due, self.unfinished, self._paired = False, path is not None, constraints
         return step if path is None else replace(step, path=path)
 
-    def check(
-        self, step: StepContext, constraints: StackedConstraints, solution: Solution, excess: float, size: float,
-        u: Array,
-    ) -> None:  # fmt: skip
+    def check(self, constraints: StackedConstraints, solution: Solution, excess: float, size: float, u: Array) -> None:
         """Set `due`, given the solution of a pairing with the displacements `u` (n_dofs,) [length].
 
         `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].
         """
         self._settled = self._shear_limit < 1.0 and solution.settled and excess <= self._near * size
         self._active, self._size = solution.active, size
-        self.due = self._outdated(step, constraints, u)
+        self.due = self._outdated(constraints, u)
         if self._paired is None:
-            self.due = self._settled and _slides(step, constraints, solution, self._shear_limit)
+            self.due = self._settled and _slides(self._step, constraints, solution, self._shear_limit)
 
-    def _outdated(self, step: StepContext, constraints: StackedConstraints, u: Array) -> bool:
+    def _outdated(self, constraints: StackedConstraints, u: Array) -> bool:
         """Return whether the geometry has changed since the increments were solved, but by less than the last time.
 
         Slips of earlier increments are those of the pairing in which they were solved.
         """
-        before = self._paired
-        if before is None or not (self._settled and step.problem.until_settled):
+        before, start = self._paired, self._step.state.u
+        if before is None or not (self._settled and self._step.problem.until_settled):
             return False
         if not len(before) == len(constraints) == len(self._active):  # slips of other constraints cannot be used
             return True
-        difference = _gaps_and_slips(before, u, step.state.u) - _gaps_and_slips(constraints, u, step.state.u)
+        difference = _gaps_and_slips(before, u, start) - _gaps_and_slips(constraints, u, start)
         shift = largest(difference[self._active])
         outdated = SINGLE_PRECISION * self._size < shift < self._shift
         self._shift = shift if outdated else self._shift
@@ -108,9 +108,7 @@ def _slides(step: StepContext, constraints: StackedConstraints, solution: Soluti
     return bool(shear[frictional & (forces[0] == 0.0)].sum() > limit * capacity[frictional].sum())
 
 
-def _path(
-    step: StepContext, constraints: StackedConstraints, iterate: Iterate, nodes: SharedNodes | None
-) -> Path | None:
+def _path(step: StepContext, constraints: StackedConstraints, nodes: SharedNodes | None) -> Path | None:
     """Return the path of a step with the gaps and forces at its beginning.
 
     None if no constraint is open there, or if the forces are unknown.
@@ -119,7 +117,14 @@ def _path(
     if forces is None:
         return None
     normal, traction = forces
-    gap = np.where(normal != 0.0, 0.0, _gaps(step, constraints, iterate))
+    state, gaps = step.state, []  # in the configuration at the beginning of the step
+    begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
+    for name, part in pair_surfaces(step.problem, state, begin, Iterate.of(state)).parts.items():
+        current = constraints.parts[name]
+        initial = part if np.array_equal(part.positions, current.positions) else current
+        determined = np.isfinite(initial.gap0) & initial.usable
+        gaps.append(np.where(determined, initial.gaps(state.u), current.gaps(state.u)))
+    gap = np.where(normal != 0.0, 0.0, np.maximum(np.concatenate(gaps), 0.0))
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     slips = _closing(step, constraints, gap)
     if nodes is not None:
@@ -158,17 +163,3 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
         elif name in step.state.touched and not part.equality.all():
             return None
     return normal, traction
-
-
-def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) -> Array:
-    """Return the gaps (m,) at the beginning of the step, measured in the configuration at its beginning [length]."""
-    state = step.state
-    begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
-    initial = pair_surfaces(step.problem, state, begin, Iterate.of(state))
-    gaps = []
-    for name, part in initial.parts.items():
-        current = constraints.parts[name]
-        initial_part = part if np.array_equal(part.positions, current.positions) else current
-        determined, u = np.isfinite(initial_part.gap0) & initial_part.usable, state.u
-        gaps.append(np.where(determined, initial_part.gap0 + initial_part.B @ u, current.gap0 + current.B @ u))
-    return np.maximum(np.concatenate(gaps), 0.0)
