@@ -146,8 +146,6 @@ def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) ->
 
 def normals_at_nodes(side: Surface, coordinates: Array) -> Array:
     """Return the unit normals (n_facets, k, dim) of all facets at the nodes `Surface.all_facets`, zero at repeated nodes."""
-    if len(side.blocks) == 1:
-        return facet_normals(side.blocks[0], coordinates)
     return padded([facet_normals(block, coordinates) for block in side.blocks])
 
 
@@ -173,18 +171,14 @@ def _angles(side: Surface, coordinates: Array) -> Array:
     """
     if coordinates.shape[1] == 2:
         return side.node_weights
-    return padded([_corner_angles(block, coordinates) for block in side.blocks])
-
-
-def _corner_angles(block: FacetBlock, coordinates: Array) -> Array:
-    """Return the angles (n_facets, n_nodes) of the faces of a block at their corners [radian]; 1 at other nodes."""
     from fastcontact.contact import projection_kernels
 
-    nodes, n = coordinates[block.facets], elements.get(block.element).n_corners
-    angle, corners = np.empty(block.facets.shape), np.arange(n)
-    adjacent = np.column_stack([(corners + 1) % n, (corners - 1) % n])
-    parallel_map(lambda span: projection_kernels.angles(nodes, adjacent, *span, angle), portions(*block.facets.shape))
-    return angle
+    angles = []
+    for block in side.blocks:
+        n = elements.get(block.element).n_corners
+        angles.append(np.empty(block.facets.shape))
+        projection_kernels.angles(coordinates[block.facets], n, angles[-1])
+    return padded(angles)
 
 
 def interpolate(normals: Array, points: Places) -> Array:

@@ -33,17 +33,14 @@ def normals(nodes, slopes, begin, end, out):
 
 
 @kernel
-def angles(nodes, beside, begin, end, out):
-    """Fill the angles (n, m) of facets `begin` to ``end - 1`` with nodes (n, m, 3) at their corners, 1 at other nodes.
-
-    `beside` (n_corners, 2) are the corners next to each corner.
-    """
-    for f in range(begin, end):
+def angles(nodes, n_corners, out):
+    """Fill the angles (n, m) of facets with nodes (n, m, 3) at their first `n_corners` nodes, and 1 at other nodes."""
+    for f in range(nodes.shape[0]):
         for a in range(nodes.shape[1]):
             out[f, a] = 1.0
-        for a in range(beside.shape[0]):
-            corner = vector(nodes, f, a)
-            p, q = minus(vector(nodes, f, beside[a, 0]), corner), minus(vector(nodes, f, beside[a, 1]), corner)
+        for a in range(n_corners):
+            corner, following, preceding = vector(nodes, f, a), (a + 1) % n_corners, (a - 1) % n_corners
+            p, q = minus(vector(nodes, f, following), corner), minus(vector(nodes, f, preceding), corner)
             product = cross(p, q)
             out[f, a] = np.arctan2(np.sqrt(dot(product, product)), dot(p, q))
 

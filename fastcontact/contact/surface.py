@@ -14,7 +14,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import cached_by_mesh, ordered_line, outer_facets, same_facets
+from fastcontact.mesh.topology import cached_by_mesh, ordered_line, outer_facets, outer_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +205,8 @@ def padded(arrays: Sequence[AnyArray]) -> AnyArray:
 
     Integers are padded with the last entry of the row, floating-point numbers with zeros.
     """
+    if len(arrays) == 1:
+        return arrays[0]
     width = max(values.shape[1] for values in arrays)
     mode: Any = "edge" if np.issubdtype(arrays[0].dtype, np.integer) else "constant"
     unpadded = [(0, 0)] * (arrays[0].ndim - 2)
@@ -234,31 +236,19 @@ def surface(mesh: Mesh, group: str) -> Surface:
         raise ContactError(
             f"group '{group}' contains no facets (cells of dimension {mesh.dim - 1}): name a boundary group"
         )
-    outer = outer_facets(mesh)
-    facets = {name: _outward(mesh, group, name, block, outer) for name, block in cells.items()}
+    remedy = (
+        ": give each body nodes of its own, which merge_points may have joined, and let boundary facets share their nodes "
+        "with solid cells"
+    )
+    facets = {}
+    for name, block in cells.items():
+        rows = outer_rows(mesh, group, name, block, ContactError, remedy)
+        facets[name] = outer_facets(mesh)[name][np.unique(rows)]
     points, abscissa = _ordered(mesh, group, facets)
     position = np.full(mesh.n_points, -1, np.intp)
     position[points] = np.arange(len(points))
     blocks = tuple(FacetBlock(name, block, position[block]) for name, block in facets.items())
     return Surface(group, blocks, points, abscissa)
-
-
-def _outward(mesh: Mesh, group: str, name: str, block: Numbers, outer: Mapping[str, Numbers]) -> Numbers:
-    """Return the facets of `block` (n, k) with the orientation that they have among the outer facets of the bodies.
-
-    `outer` are the outer facets by element type; `name` is the element type of the block.
-    """
-    candidates = outer.get(name, np.empty((0, elements.get(name).n_nodes), np.int32))
-    rows = same_facets(candidates, block)
-    missing = np.flatnonzero(rows < 0)
-    if len(missing):
-        where = mesh.points[block[missing[0]]].mean(axis=0)
-        raise ContactError(
-            f"facets of '{group}' do not lie on the outside of a solid (number: {len(missing)} of {len(block)}, first near "
-            f"{where}): give each body nodes of its own, which merge_points may have joined, and let boundary "
-            "facets share their nodes with solid cells"
-        )
-    return np.ascontiguousarray(candidates[np.unique(rows)])
 
 
 def _ordered(mesh: Mesh, group: str, facets: Mapping[str, Numbers]) -> tuple[Numbers, Array]:

@@ -25,7 +25,7 @@ from fastcontact.errors import ModelError, check_known
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import outer_facets, same_facets
+from fastcontact.mesh.topology import outer_facets, outer_rows
 
 Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
@@ -301,16 +301,9 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
 
     Raises ModelError, with the name of the `group`, if a facet does not lie on the outside of a solid.
     """
-    outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
-    rows = same_facets(outer, block)
-    missing = np.flatnonzero(rows < 0)
-    if len(missing):
-        where = mesh.points[block[missing[0]]].mean(axis=0)
-        raise ModelError(
-            f"facets of '{group}' do not lie on the outside of a solid (number: {len(missing)} of {len(block)}, first near "
-            f"{where}), where a pressure has no direction: use add_traction there"
-        )
-    return np.ascontiguousarray(outer[rows])
+    remedy = ", where a pressure has no direction: use add_traction there"
+    rows = outer_rows(mesh, group, element, block, ModelError, remedy)
+    return np.ascontiguousarray(outer_facets(mesh)[element][rows])
 
 
 def evaluated(value: Value, points: Array, name: str) -> Array:

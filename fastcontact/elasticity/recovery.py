@@ -83,15 +83,6 @@ class CellStress:
         the material numbers of cells, `material` (n_cells,), or of quadrature points, (n_cells, n_q).
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
-        self.fill(name, xi, cells, material, out, rows)
-        return out
-
-    def fill(self, name: str, xi: Array, cells: Numbers, material: Numbers, out: Array, rows: Indices) -> None:
-        """Fill `out` (n_cells, n, n_components) [pressure] with the stresses, in parallel.
-
-        The points `xi` (n, dim) [-] and the integer arrays `cells` (n_cells, n_nodes), `material` (n_cells,) or
-        (n_cells, n_q) and `rows` (n_cells,) are described for `at`.
-        """
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
         N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
@@ -116,6 +107,7 @@ class CellStress:
         parallel.parallel_map(fill_rows, parallel.portions(len(out), cells.shape[1]))
         if self._offset is not None:
             self._add_offset(self._offset, (name, xi, rows), cells, material, out)
+        return out
 
     def _fill_varying(
         self, location: tuple[str, Array, Array, Array], cells: Numbers, material: Numbers, moduli: Array,
@@ -258,12 +250,11 @@ def nodal_stress(
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, _ = element.quadrature
-        bytes_of_cell = 8 * len(xi) * moduli.shape[1]
-        buffer = np.empty((min(len(block), BATCH // bytes_of_cell + 1), len(xi), moduli.shape[1]))
-        for first in range(0, len(block), len(buffer)):
-            rows = slice(first, first + len(buffer))
-            values = buffer[: len(block) - first]
-            stress.fill(name, xi, block[rows], material[name][rows], values, np.arange(first, first + len(values)))
+        size = BATCH // (8 * len(xi) * moduli.shape[1]) + 1
+        for first in range(0, len(block), size):
+            rows = slice(first, first + size)
+            numbers = np.arange(first, min(first + size, len(block)))
+            values = stress.at(name, xi, block[rows], material[name][rows], numbers)
             _add(average, slots[name][rows], element.extrapolation, values)
     return average.result()
 

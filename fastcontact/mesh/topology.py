@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.errors import MeshError
+from fastcontact.errors import FastcontactError, MeshError
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh, facets_of_cells
 
@@ -192,6 +192,24 @@ def same_facets(table: Numbers, facets: Numbers) -> Indices:
     keys = np.sort(np.vstack([table[candidates], facets]), axis=1)
     _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return np.append(candidates, -1)[np.minimum(first[index.ravel()[len(candidates) :]], len(candidates))]
+
+
+def outer_rows(
+    mesh: Mesh, group: str, name: str, facets: Numbers, error: type[FastcontactError], remedy: str
+) -> Indices:
+    """Return the rows (n,) of `facets` (n, k) of one element type, those of a `group`, among the `outer_facets`.
+
+    Raises `error` with a `remedy` if a facet is not an outer facet.
+    """
+    rows = same_facets(outer_facets(mesh).get(name, facets[:0]), facets)
+    missing = np.flatnonzero(rows < 0)
+    if len(missing):
+        position = mesh.points[facets[missing[0]]].mean(axis=0)
+        raise error(
+            f"facets of '{group}' do not lie on the outside of a solid (number: {len(missing)} of {len(facets)}, first near "
+            f"{position}){remedy}"
+        )
+    return rows
 
 
 @dataclass(frozen=True, eq=False)
