@@ -43,17 +43,17 @@ class Conductance:
     """
 
     def __init__(self, name: str, law: Any) -> None:
-        self.name, self._law = name, law
-        self._constant = float(law) if isinstance(law, (int, float)) and not isinstance(law, bool) else None
-        self._tables: dict[str, Array] = {}
-        if self._constant is not None:
-            if not 0.0 <= self._constant < np.inf:
+        self.name, self._law, self._tables = name, law, dict[str, Array]()
+        if callable(law):
+            return
+        tables = law if isinstance(law, Mapping) else {"pressure": law}
+        if isinstance(law, (int, float)) and not isinstance(law, bool):
+            if not 0.0 <= law < np.inf:
                 raise ContactError(f"the conductance {law} of contact '{name}' must be a number, zero or more")
-        elif not callable(law):
-            tables = law if isinstance(law, Mapping) else {"pressure": law}
-            if not tables or not set(tables) <= set(TABLES):
-                raise self._invalid()
-            self._tables = {key: self._table(rows) for key, rows in tables.items()}
+            tables = {"pressure": [(0.0, law)]}
+        if not tables or not set(tables) <= set(TABLES):
+            raise self._invalid()
+        self._tables = {key: self._table(rows) for key, rows in tables.items()}
 
     def _table(self, rows: Any) -> Array:
         try:
@@ -86,8 +86,6 @@ class Conductance:
         Raises ContactError if a function fails or does not return nonnegative numbers of this shape.
         """
         closed = gap == 0.0
-        if self._constant is not None:
-            return np.where(closed, self._constant, 0.0)
         if not callable(self._law):
             arguments = {"pressure": pressure, "gap": gap}
             interpolated = {key: np.interp(arguments[key], *table.T) for key, table in self._tables.items()}

@@ -50,11 +50,6 @@ class UnrolledLine:
         """Total length of the line [length]."""
         return float(self.abscissa[-1])
 
-    @classmethod
-    def straight(cls, middle: Array, direction: Array, reach: float) -> UnrolledLine:
-        """Return a straight line along `direction` (2,) that extends by `reach` on both sides of `middle` (2,) [length]."""
-        return cls(middle + np.outer([-reach, reach], direction), np.array([0.0, 2.0 * reach]))
-
     def at(self, length: float) -> Array:
         """Return the point (2,) at an arc length along the line [length]."""
         x, y = self.nodes.T
@@ -226,7 +221,8 @@ def _middle_in_2d(
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
     line = unrolled(surface, coordinates, centre if length > FACING else None)
     if line is None:
-        line = UnrolledLine.straight(centre, tangent, float(np.ptp(points, axis=0).max()))
+        reach = float(np.ptp(points, axis=0).max())
+        line = UnrolledLine(centre + np.outer([-reach, reach], tangent), np.array([0.0, 2.0 * reach]))
     lengths = line.lengths(points)
     if len(planes) == 1 and not line.closed:
         axis, on_plane = planes[0]

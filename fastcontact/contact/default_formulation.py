@@ -34,11 +34,9 @@ def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict
     The returned options are those of the user, `options`, and those that the choice adds. The reason is a clause that
     follows "because".
     """
-    standard_options = [name for name in STANDARD_OPTIONS if name in options] if dim == 2 else []
-    if "multipliers" in options:
-        return "mortar", dict(options), "the pair has the option 'multipliers'"
-    if standard_options:
-        return "mortar", dict(options), f"the pair has the option '{standard_options[0]}'"
+    for name in ("multipliers", *(STANDARD_OPTIONS if dim == 2 else ())):
+        if name in options:
+            return "mortar", dict(options), f"the pair has the option '{name}'"
     reason = "these are accurate on any two surfaces and cost little with every linear solver"
     return "mortar", {**options, "multipliers": "dual"}, reason
 

@@ -122,8 +122,6 @@ class _Polygons:
         Centres of the facets [length], and unit vectors (in rows): two in the plane of the corners, and its normal.
     radius : ndarray (n,)
         Largest distance of a corner from the centre [length].
-    low, high : ndarray (n, 3)
-        Bounding boxes of the corners [length].
     """
 
     block: FacetBlock
@@ -132,8 +130,6 @@ class _Polygons:
     origin: Array
     axes: Array
     radius: Array
-    low: Array
-    high: Array
 
     @classmethod
     def of(cls, block: FacetBlock, deformed: Array) -> _Polygons:
@@ -141,9 +137,8 @@ class _Polygons:
         nodes, count = deformed[block.facets], elements.get(block.element).n_corners
         origin, axes = np.empty((len(nodes), 3)), np.empty((len(nodes), 3, 3))
         _cut_faces_kernels.planes(nodes, count, origin, axes)
-        corners = nodes[:, :count]
-        radius = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
-        return cls(block, nodes, count, origin, axes, radius, corners.min(axis=1), corners.max(axis=1))
+        radius = np.linalg.norm(nodes[:, :count] - origin[:, None], axis=2).max(axis=1)
+        return cls(block, nodes, count, origin, axes, radius)
 
 
 def _overlap_candidates(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
@@ -152,7 +147,8 @@ def _overlap_candidates(secondary: _Polygons, primary: _Polygons, reach: Array) 
     `reach` (n_secondary,) are the largest distances at which facets are paired [length].
     """
     numbers = tree_order(primary.origin, 1)
-    tree = build(primary.low[numbers], primary.high[numbers])
+    corners = primary.nodes[numbers, : primary.count]
+    tree = build(corners.min(axis=1), corners.max(axis=1))
     capacity = 8 * (len(secondary.nodes) + len(primary.nodes))
     while True:
         pairs = np.empty((capacity, 2), np.intp)

@@ -236,13 +236,15 @@ class PressureFieldFormulation(Formulation):
             on_held_facets[block.local[held[block.local].all(axis=1)]] = True
         return dependent | (held & ~on_held_facets)
 
-    def repeated(self, field: tuple[csr_array, Indices], same: Indices) -> tuple[csr_array, Indices]:
-        """Return a pressure field in which coincident nodes have a common value.
+    def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
+        """Return a pressure field in which the nodes of `PairOptions.same_place` have a common value.
 
         Both `field` and the result consist of the map (n_nodes, k) from independent to nodal values, and the nodes (k,) of
-        the independent values. `same` (n_points,) is `PairOptions.same_place`.
+        the independent values.
         """
-        values, nodes = field
+        (values, nodes), same = field, self.options.same_place
+        if same is None:
+            return field
         first, column = np.unique(same[self.secondary.points[nodes]], return_inverse=True)
         independent = np.empty(len(first), np.intp)
         independent[column] = nodes

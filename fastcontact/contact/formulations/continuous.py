@@ -83,8 +83,7 @@ class Continuous(PressureFieldFormulation):
         areas_of_points = np.where(self._candidates.belonging_to(self.excluded), 0.0, all_areas)
         nodes = padded(local)
         P = shapes_at(self._candidates.shape, nodes, len(self.secondary.points))
-        field = self._independent_values(P, areas_of_points)
-        field = field if self.options.same_place is None else self.repeated(field, self.options.same_place)
+        field = self.repeated(self._independent_values(P, areas_of_points))
         points, areas_of_all = (nodes, self._candidates.shape), (areas_of_points, all_areas)
         kind = {"renewed": False, "eliminable": self.eliminable, "quadratic": self.secondary.order > 1}
         self._field = PressureField.of_points(points, areas_of_all, float(rho), field, **kind)

@@ -215,8 +215,7 @@ class SegmentMortar(PressureFieldFormulation):
         usable_area, (n, k) = np.where(usable, area, 0.0), block.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        values = independent_values(self.secondary, self._whole, mass, self.dependent_nodes(config))
-        values = values if self.options.same_place is None else self.repeated(values, self.options.same_place)
+        values = self.repeated(independent_values(self.secondary, self._whole, mass, self.dependent_nodes(config)))
         samples = block.local[facet], shape
         field = PressureField.of_points(samples, (usable_area, area), self._rho, values, renewed=True)
         return self.of_points(candidates, pairing, field, config)
