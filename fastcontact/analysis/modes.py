@@ -11,6 +11,7 @@ from scipy.sparse import bsr_array
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
 from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
 from fastcontact.analysis.modal.cyclic import Sectors, Wave, pairs_of, without_ends
 from fastcontact.analysis.modal.eigenpairs import Reduced, lowest
 from fastcontact.analysis.modal.held_contact import Conditions, held_contact, joined
@@ -51,8 +52,8 @@ def modes(
 
     Closed nodes remain closed, sticking nodes do not slip, sliding nodes are free along the surface, and open nodes
     are free. Supports, multi-point constraints, couplings and springs act as in the step, and pretension sections keep
-    their length. The stresses of the step stiffen or soften the bodies; in finite strain the modes are
-    those of the deformed bodies under follower pressures. Force-driven obstacles have no mass.
+    their length. The stresses of the step stiffen or soften the bodies, and contact forces follow the surfaces; in finite
+    strain the modes are those of the deformed bodies under follower pressures. Force-driven obstacles have no mass.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def modes(
     n : int
         Number of modes, for each number of nodal diameters; a pair of modes counts once.
     stress_stiffening : bool
-        Whether to include the stresses of the step.
+        Whether to include the stresses of the step, and the rotation of its pressures and contact forces.
     hold_sliding : bool
         Whether to treat nodes that slide in the step as sticking, as friction does when a vibration reverses the slip.
         Otherwise a body that slides along its whole circumference, such as a tightened bolt, is free to rotate.
@@ -173,6 +174,9 @@ class _Vibration:
         # occur in loaded bodies that rotate freely. The corresponding frequency is NOTABLE times that of a uniform
         # deformation, which is below the frequencies of all but thin bodies.
         shift = NOTABLE**2 * _uniform_quotient(model, K, M)
+        K = model.force_driven.stiffness(K)
+        if stressed is not None:
+            K = sum_of_blocks(K, contact_stiffness(model, stressed, held))
         return cls(model, field, K, M, contact, supported, shift, with_sliding)
 
     def warn_of_sliding_modes(self, values: Array, vectors: Array) -> None:
@@ -196,11 +200,7 @@ class _Vibration:
         # Pretension sections keep their current length.
         locked_lengths = [MultiPointConstraint(bolt.name, bolt.row(model.n_dofs)) for bolt in model.pretensions]
         relations = [*model.relations, *locked_lengths]
-        K, M, nullspace = (
-            driven.stiffness(self.K),
-            driven.stiffness(self.M),
-            driven.near_nullspace(near_nullspace(model)),
-        )
+        K, M, nullspace = self.K, driven.stiffness(self.M), driven.near_nullspace(near_nullspace(model))
         supported, without_stiffness = driven.supported(self.supported).ravel(), driven.without_stiffness
         if wave is not None:
             K, M, relations = wave.real_blocks(K), wave.real_blocks(M), wave.relations(model, relations)

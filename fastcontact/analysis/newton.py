@@ -221,9 +221,13 @@ class _Newton:
     def _accelerated(self, before: Array, u: Array, changes: list[float]) -> Array:
         """Return the next iterate (n_dofs,) [length], after an iteration from `before` (n_dofs,) to u (n_dofs,).
 
-        Anderson acceleration is used where a regularised tangent makes the iterations converge linearly.
+        Anderson acceleration is used where a regularised tangent makes the iterations converge linearly. The springs of
+        floating bodies also do so if the load turns a body, like a roller without friction: its rotations change by a
+        constant factor, which exceeds 1 if it is not stable.
         """
-        if not self._regularisation.linear or DECLINE * changes[-1] > changes[-2]:
+        floats = self._problem.floating_bodies is not None and len(changes) > 2 and changes[-1] <= NOTABLE
+        drifts = floats and changes[-1] > DECLINE * changes[-2] > DECLINE**2 * changes[-3]
+        if not (self._regularisation.linear or drifts) or DECLINE * changes[-1] > changes[-2]:
             self._mixing.restart()
             return u
         return self._mixing.mixed(before, u)

@@ -37,7 +37,7 @@ from fastcontact.contact.projection import (
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
-from fastcontact.linear.sparse_rows import shapes_at
+from fastcontact.linear.sparse_rows import nodal_rows, rows_of, scaled, shapes_at
 from fastcontact.round_off import DIFFERENCES, TINY
 
 
@@ -240,6 +240,33 @@ class _SurfacePoints:
         motion = shapes_at(-np.einsum("nki,ni->nk", self._at.gradient, xi), self._at.nodes, len(du))
         return Variation(xi, motion, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
 
+    def stiffness(self, force: Array) -> csr_array:
+        r"""Return the stiffness (n_dofs, n_dofs) of constant normal forces (n,) [force] at the points [force / length].
+
+        It contains minus the second variation of the gaps g,
+
+        .. math:: - \delta^2 g = 2 n \cdot \delta y_{,\alpha} \delta \xi^\alpha
+                  - n_{,\alpha} \cdot y_{,\beta} \delta \xi^\alpha \delta \xi^\beta - g |\delta n|^2, \qquad
+                  \delta n = - y^{,\alpha} (n \cdot \delta y_{,\alpha})
+
+        with the dual axes :math:`y^{,\alpha}`, up to products of gap and curvature (Laursen, 2002, section 5.3).
+        """
+        n_dofs, gap, axes = self.motion.shape[1] * self.normal.shape[1], self._gap[:, 0], range(self.axes.shape[1])
+        dual = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
+        metric, bend = np.einsum("nid,njd->nij", dual, dual), np.einsum("nid,njd->nij", self._bend, self.axes)
+        slopes = self._at.gradient[..., None] * self.normal[:, None, None]
+        tilts = [nodal_rows(self._at.nodes, slopes[:, :, i], n_dofs) for i in axes]
+        xi = [
+            rows_of(self.motion, dual[:, i]) + sum(scaled(tilts[j], gap * metric[:, i, j]) for j in axes) for i in axes
+        ]
+        K = csr_array((n_dofs, n_dofs))
+        for i in axes:
+            K += 2.0 * tilts[i].T @ scaled(xi[i], force)
+            for j in axes:
+                K -= xi[i].T @ scaled(xi[j], force * bend[:, i, j])
+                K -= tilts[i].T @ scaled(tilts[j], force * gap * metric[:, i, j])
+        return csr_array(0.5 * (K + K.T))
+
 
 class _ObstaclePoints:
     """Points paired with a rigid obstacle, which has no nodes, and the variation of their normals with their positions.
@@ -271,6 +298,13 @@ class _ObstaclePoints:
         normal = np.einsum("nde,ne->nd", self._gradient, motion)
         foot = transverse(self.normal, motion) - self._gap * normal
         return Variation(np.zeros((len(normal), 0)), csr_array(self.motion.shape), foot, normal)
+
+    def stiffness(self, force: Array) -> csr_array:
+        """See `_SurfacePoints.stiffness`."""
+        rows = [rows_of(self.motion, np.broadcast_to(axis, self.normal.shape)) for axis in np.eye(self.normal.shape[1])]
+        turned = [rows_of(self.motion, self._gradient[:, i]) for i in range(len(rows))]
+        K = -sum(row.T @ scaled(turn, force) for row, turn in zip(rows, turned, strict=True))
+        return csr_array(0.5 * (K + K.T))
 
 
 Points: TypeAlias = _SurfacePoints | _ObstaclePoints

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, hstack
+from scipy.sparse import bsr_array, csr_array, eye_array, hstack
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
@@ -145,6 +145,12 @@ class ForceDrivenObstacles:
             slip0 = constraints.slip0 + np.stack([t @ moved for t in constraints.directions])
         gap0 = constraints.gap0 + normal @ position
         return dataclasses.replace(constraints, B=B, gap0=gap0, tangents=tangents, slip0=slip0)
+
+    def contact_stiffness(self, name: str, K: csr_array) -> csr_array:
+        """Return the stiffness of pair `name` for the displacements of all obstacles, from that with its obstacle fixed."""
+        rows, number = csr_array(eye_array(K.shape[0], format="csr")), self.number(name)
+        motion = self._with_empty_columns(rows) if number is None else self._with_motion(rows, number)[0]
+        return csr_array(motion.T @ K @ motion)
 
     def _with_motion(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
         """Return rows (m, n_dofs) that include the motion of an obstacle, and their directions (m, dim)."""

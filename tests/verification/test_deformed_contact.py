@@ -206,6 +206,31 @@ def test_a_ring_in_a_groove_without_friction(steps: int) -> None:
     assert all(contact[name].normal_force > 50.0 for name in ("inner", "outer"))
 
 
+@pytest.mark.filterwarnings("ignore:contact .* has only")
+@pytest.mark.parametrize(
+    "options", [{}, {"formulation": "node_to_segment"}], ids=lambda own: own.get("formulation", "mortar")
+)
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+def test_a_rubber_cord_without_friction_that_can_rotate_is_squeezed_as_one_that_cannot(element, options) -> None:
+    """On polygons of facets the position is unstable, and Newton's method with springs alone would turn the cord further."""
+    square = fc.generate.block((2.0, 2.0), (8, 8), element, (-1.0, -1.0))
+    x, y = square.points.T
+    disc = 2.5 * np.column_stack([x * np.sqrt(1.0 - 0.5 * y**2), y * np.sqrt(1.0 - 0.5 * x**2)])
+    groups = {"MIDDLE": [int(np.linalg.norm(disc, axis=1).argmin())], "AXIS": np.flatnonzero(np.abs(x) < 1e-9).tolist()}
+    mesh = square.replace(points=disc, point_groups=groups)
+    for name, sign in (("LOWER", -1.0), ("UPPER", 1.0)):
+        mesh = mesh.with_facet_group(name, lambda at, sign=sign: (np.hypot(*at.T) > 2.4) & (sign * at[:, 1] > -1e-6))
+    forces = []
+    for held in ("MIDDLE", "AXIS"):
+        model = made_of(mesh, "plane_strain", fc.NeoHookean(E=6.0, nu=0.4995), strain="finite")
+        model.fix(held, "x")
+        for name, side, y, motion in (("floor", "LOWER", -2.5, None), ("lid", "UPPER", 2.5, {"y": -1.25})):
+            plate = fc.obstacles.HalfSpace((0.0, y), (0.0, -np.sign(y)))
+            model.add_obstacle(name, secondary=side, obstacle=plate, motion=motion, **options)
+        forces.append(fc.solve(model, 2)[-1].contact["lid"].normal_force)
+    assert forces[0] == pytest.approx(forces[1], rel=1e-3)
+
+
 @pytest.mark.filterwarnings("ignore:contact .* elements across its radius")
 def test_fluid_pushes_a_ring_with_friction_across_its_groove() -> None:
     """Squeezed, then pressurised; at the front of the fluid a node may be neither wet nor dry.

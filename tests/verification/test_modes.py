@@ -5,9 +5,12 @@ import warnings
 import numpy as np
 import pytest
 from models import elastic_model, supported
+from scipy.sparse import csr_array
 
 import fastcontact as fc
+from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
 from fastcontact.cli import main
+from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.mesh import elements
 
 pytestmark = pytest.mark.each_value
@@ -262,6 +265,127 @@ def test_a_loaded_disc_between_plates_turns_freely(solver):
     assert abs(turn) < 0.02 * bounce
     assert not modes.unstable.any()
     assert ("1 of 2 modes with omega^2 < 0 are rotations of rigid bodies" in repr(modes)) == (turn < 0.0)
+
+
+FACES = {"XMIN": "LEFT", "XMAX": "RIGHT", "YMIN": "BOTTOM", "YMAX": "TOP"}
+
+
+def plates(turn=0.0, options=None, swapped=False, element="quad8", strain="small"):
+    """Return two plates of 100 x 4, clamped at one end and turned in their plane, and the direction across them."""
+    flat, c, s = element in FLAT, np.cos(turn), np.sin(turn)
+    parts = []
+    for name, y, n in (("LOW", 0.0, 30), ("UP", 4.0, 24)):
+        part = (
+            block((100.0, 4.0), (n, 2), element, (0.0, y), name=name)
+            if flat
+            else box((100.0, 4.0, 10.0), (n, 1, 2), element, (0.0, y, 0.0), name=name)
+        )
+        parts.append(
+            fc.generate.renamed(part, lambda own, name=name: own if own == name else f"{name} {FACES.get(own, own)}")
+        )
+    mesh = union(*parts)
+    turned = mesh.points.copy()
+    turned[:, :2] = mesh.points[:, :2] @ [[c, s], [-s, c]]
+    model = fc.Model(mesh.replace(points=turned), "plane_stress" if flat else "3d", strain=strain)
+    model.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
+    supported(model, **{"LOW LEFT": "xyz"[: mesh.dim], "UP LEFT": "xyz"[: mesh.dim]})
+    sides = ("LOW TOP", "UP BOTTOM")[:: 1 if swapped else -1]
+    model.add_contact("joint", secondary=sides[0], primary=sides[1], **(options or {}))
+    return model, {"x": -s, "y": c}
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        *({"options": options} for options in FORMULATIONS),
+        {"options": FORMULATIONS[-1], "swapped": True},
+        {"turn": np.pi / 6.0, "swapped": True},
+        {"strain": "finite", "turn": np.pi / 6.0},
+        {"element": "hex20"},
+        {"element": "hex8", "options": {"formulation": "node_to_segment"}},
+    ],
+    ids=str,
+)
+def test_plates_that_forces_of_constant_directions_press_together_vibrate_as_without_them(given):
+    """The points of both faces keep their distance across the plates to second order, so that the forces do no work."""
+    model, across = plates(**given)
+    for side, pressure in (("UP TOP", -5.0), ("LOW BOTTOM", 5.0)):
+        model.add_traction(side, **{axis: pressure * value for axis, value in across.items()})
+    step = fc.solve(model, 1)[-1]
+    free = fc.modes(model, step, 1, stress_stiffening=False).frequencies
+    assert fc.modes(model, step, 1).frequencies == pytest.approx(free, rel=5e-4)  # without contact forces 3.6 % lower
+
+
+def test_a_stack_of_plates_under_pressure_vibrates_as_each_plate_between_pressures():
+    """The ends are guided. Docs: alone, the plates and the pressure have 334 Hz with a free end."""
+    model, _ = plates()
+    alone = fc.Model(block((100.0, 4.0), (30, 2), "quad8"), "plane_stress")
+    alone.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
+    for loaded, prefix in ((model, ("LOW ", "UP ")), (alone, ("",))):
+        loaded.add_pressure(f"{prefix[-1]}TOP", 50.0)
+        loaded.add_pressure(f"{prefix[0]}BOTTOM", 50.0)
+        for part in prefix:
+            loaded.fix(f"{part}LEFT", "xy")
+            loaded.fix(f"{part}RIGHT", "x")
+    stack, single = (fc.modes(loaded, fc.solve(loaded, 1)[-1], 1).frequencies for loaded in (model, alone))
+    assert stack == pytest.approx(single, rel=5e-4)
+    assert single > 1.02 * fc.modes(alone, n=1).frequencies
+
+
+@pytest.mark.parametrize("options", FORMULATIONS, ids=lambda own: "-".join(own.values()))
+@pytest.mark.parametrize("swapped", [False, True])
+def test_rods_pressed_end_to_end_between_pins_slide_past_each_other(options, swapped):
+    """Turning both by t lengthens the distance L of the pins to L / cos(t): ``w^2 = P L / inertia``, and no buckling."""
+    rods = []
+    for name, x, n in (("ONE", 0.0, 4), ("TWO", 0.5, 3)):
+        rod = block((0.5, 0.1), (10, n), "quad8", (x, -0.05), name=name)
+        rods.append(fc.generate.renamed(rod, lambda own, name=name: own if own == name else f"{name} {own}"))
+    mesh = union(*rods)
+    pins = {
+        name: [int(np.linalg.norm(mesh.points - [x, 0.0], axis=1).argmin())] for name, x in (("A", 0.0), ("B", 1.0))
+    }
+    loose, held = (model_of(mesh.replace(point_groups=pins), "plane_stress") for _ in range(2))
+    supported(held, ONE={"y": 0.0}, TWO={"y": 0.0})  # without forces
+    for model in (loose, held):
+        supported(model, A="xy", B="y")
+        sides = ("ONE RIGHT", "TWO LEFT")[:: -1 if swapped else 1]
+        model.add_contact("joint", secondary=sides[0], primary=sides[1], **options)
+        model.add_traction("TWO RIGHT", x=-1e-5)
+    found = fc.modes(loose, fc.solve(held, 1)[-1], 1).eigenvalues[0]
+    inertia = 2.0 * 0.05 * (0.25 / 3.0 + 0.01 / 12.0)
+    assert found == pytest.approx(1e-5 * 0.1 / inertia, rel=0.02)
+
+
+def test_a_pipe_in_a_trough_is_a_pendulum_that_turns_freely():
+    """``w^2 = g / (R - r)`` without friction, and zero."""
+    R, g = 2.0, 1e-3
+    mesh = block((1.0, 1.0), (64, 6), "quad8", name="PIPE")
+    angle, radius = -2.0 * np.pi * mesh.points[:, 0], 0.4 + 0.6 * mesh.points[:, 1]
+    mesh = mesh.replace(points=np.column_stack([radius * np.sin(angle), -radius * np.cos(angle)]))
+    mesh = fc.generate.merge_points(mesh, 1e-9)
+    mesh = mesh.replace(point_groups={"PIN": [int(np.linalg.norm(mesh.points - [0.0, -0.4], axis=1).argmin())]})
+    loose, held = (model_of(mesh, "plane_strain", 0.3) for _ in range(2))
+    held.fix("PIN", "x")  # without a force, by symmetry
+    floor = fc.obstacles.Sphere((0.0, R - 1.0), R, hollow=True)
+    for model in (loose, held):
+        model.add_gravity(y=-g)
+        model.add_obstacle("floor", secondary="TOP", obstacle=floor)
+    found = fc.modes(loose, fc.solve(held, 1)[-1], 2).eigenvalues
+    assert found == pytest.approx([0.0, g / (R - 1.0)], abs=0.03 * g)
+
+
+def test_contact_forces_on_a_driven_obstacle_move_with_both():
+    """The contact stiffness does not resist a translation of body and obstacle."""
+    model = model_of(block((2.0, 1.0), (20, 10), origin=(-1.0, -1.0)), "plane_strain")
+    model.fix("BOTTOM", "xy")
+    ball = fc.obstacles.Sphere((0.1, 3.0), 3.0)
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -0.01})
+    step = fc.solve(model, 1)[-1]
+    K = contact_stiffness(model, step, HeldMotions.of(model.prescribed_by_ramp()[0], csr_array((0, model.n_dofs))))
+    together, apart = np.tile([1.0, 0.0], K.shape[0] // 2), np.zeros(K.shape[0])
+    apart[-2] = 1.0
+    assert np.abs(K @ together).max() < 1e-12 * np.abs(K.data).max()
+    assert apart @ K @ apart == pytest.approx(-0.01 / 3.0, rel=0.05)
 
 
 def test_a_column_beyond_its_buckling_load_is_unstable():

@@ -101,14 +101,22 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
             continue
         if formulation.options.cohesion is not None:
             raise ModelError(f"modes do not support cohesion or adhesion: tie contact '{pair.name}', or leave it out")
-        configuration = Configuration.undeformed(model.mesh.points) if step is None else end_of(step, step, pair.name)
-        if contact is not None and contact.wear is not None:
-            configuration = replace(configuration, worn=at_points(contact.points, contact.wear, model.mesh.n_points))
+        configuration = configuration_of(step, pair.name, formulation)
         constraints = formulation.constraints(configuration)
         if model.force_driven.pairs:
             constraints = model.force_driven.constraints(pair.name, constraints, configuration.pose.displacement)
         conditions += _conditions(formulation, constraints, contact, hold_sliding)
     return conditions
+
+
+def configuration_of(step: StepResult | None, name: str, pair: Formulation) -> Configuration:
+    """Return the configuration of a pair at the end of a step, or at rest."""
+    if step is None:
+        return Configuration.undeformed(pair.points)
+    contact, configuration = step.contact[name], end_of(step, step, name)
+    if contact.wear is None:
+        return configuration
+    return replace(configuration, worn=at_points(contact.points, contact.wear, len(pair.points)))
 
 
 def _conditions(
