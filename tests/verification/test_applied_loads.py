@@ -102,9 +102,7 @@ def test_a_column_under_its_weight(element):
     else:
         mesh, axis = fc.generate.box((1.0, 1.0, 4.0), (1, 1, 3), element), 2
         sides, kinematics = {"bottom": "ZMIN", "left": "XMIN"}, "3d"
-    model = elastic_model(mesh, kinematics, E=E, nu=0.0)
-    model.fix(sides["bottom"], "xyz"[axis])
-    model.fix(sides["left"], "x")
+    model = elastic_model(mesh, kinematics, E=E, nu=0.0, **{sides["bottom"]: "xyz"[axis], sides["left"]: "x"})
     if axis == 2:
         model.fix("YMIN", "y")
     model.add_body_force(**{"xyz"[axis]: -2.0})
@@ -433,8 +431,7 @@ def boxes(lower, upper):
 def test_a_box_pressed_on_another_in_3d(lower, upper, solver):
     model = model_on(boxes(lower, upper), "3d")
     for body in ("LOWER", "UPPER"):
-        model.fix(f"{body}_XMIN", "x")
-        model.fix(f"{body}_YMIN", "y")
+        supported(model, **{f"{body}_XMIN": "x", f"{body}_YMIN": "y"})
     model.fix("LOWER_ZMIN", "z")
     model.add_contact("base", secondary="LOWER_ZMAX", primary="UPPER_ZMIN", formulation="mortar")
     model.add_pressure("UPPER_ZMAX", 3.0)
@@ -474,8 +471,7 @@ def test_a_sub_model_follows_the_stages_of_the_global_model():
     """A block is pressed onto a rigid plane with friction and then sheared; its lower half is solved again on its own."""
 
     def model(height, divisions):
-        model = fc.Model(fc.generate.block((1.0, height), (4, divisions), "quad8"), "plane_strain")
-        model.add_material(fc.LinearElastic(E=100.0, nu=0.3))
+        model = elastic_model(fc.generate.block((1.0, height), (4, divisions), "quad8"), "plane_strain", E=100.0)
         plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
         model.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, friction=0.3)
         return model

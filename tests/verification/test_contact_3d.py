@@ -38,8 +38,7 @@ def two_cubes(lower, upper, divisions=((2, 3, 2), (2, 3, 2))):
 def pressed(mesh, formulation, swap=False, push=0.01, **options):
     model = elastic_model(mesh, "3d", E=E, nu=NU)
     for name in ("LOWER", "UPPER"):
-        model.fix(f"{name}_XMIN", "x")
-        model.fix(f"{name}_YMIN", "y")
+        supported(model, **{f"{name}_XMIN": "x", f"{name}_YMIN": "y"})
     supported(model, LOWER_ZMIN="z", UPPER_ZMAX={"z": -push})
     sides = ("UPPER_ZMIN", "LOWER_ZMAX") if swap else ("LOWER_ZMAX", "UPPER_ZMIN")
     model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation=formulation, **options)

@@ -69,8 +69,7 @@ def test_a_supported_reference_point_has_a_force_and_a_moment(kind, held):
     mesh = fc.generate.with_reference_points(fc.generate.block((4.0, 2.0), (4, 2), "quad8"), {"HUB": (1.0, -0.5)})
     model = elastic_model(mesh, "plane_strain", E=E)
     model.add_coupling("HUB", "BOTTOM", kind=kind)
-    model.fix("HUB", held)
-    model.fix("HUB rotation", "x")
+    supported(model, HUB=held, **{"HUB rotation": "x"})
     if held == "x":
         model.add_force("HUB", y=2.0 * FORCE)
         model.add_spring("TOP_RIGHT", y=1.0)

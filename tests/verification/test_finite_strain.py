@@ -193,8 +193,7 @@ def test_simple_shear(kinematics: str, element: str, law: str) -> None:
     mesh = fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element=element) if solid else fc.generate.block(element=element)
     model = made_of(mesh, kinematics, material, strain="finite")
     bottom, top, sides = ("YMIN", "YMAX", ("XMIN", "XMAX")) if solid else ("BOTTOM", "TOP", ("LEFT", "RIGHT"))
-    model.fix(bottom, "x")
-    model.prescribe(top, x=0.4)
+    supported(model, **{bottom: "x", top: {"x": 0.4}})
     for side in sides:
         model.prescribe(side, x=lambda points: 0.4 * points[:, 1])
     for group in (bottom, top, *sides):

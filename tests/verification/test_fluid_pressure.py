@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -29,8 +29,7 @@ def seal(element="quad4", push=-0.02, source="B BOTTOM_LEFT", **options):
     mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, n=n: f"{n} {g}") for b, n in zip(bodies, "AB")))
     model = elastic_model(mesh, "3d" if solid else "plane_strain", E=E, nu=0.0)
     bottom, top, axes = names
-    model.fix(f"A {bottom}", axes)
-    model.prescribe(f"B {top}", **dict.fromkeys(axes[:-1], 0.0))
+    supported(model, **{f"A {bottom}": axes, f"B {top}": dict.fromkeys(axes[:-1], 0.0)})
     model.prescribe(f"B {top}", **{axes[-1]: push}, ramp=HELD)
     model.add_contact("seal", secondary=f"B {bottom}", primary=f"A {top}", **options)
     model.add_fluid_pressure("seal", 1.0, source=source, ramp=FLUID)

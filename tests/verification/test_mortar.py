@@ -102,9 +102,7 @@ def pressed(mesh, kinematics="3d", swap=False, **options):
         for group, axis in lateral:
             model.fix(f"{side}_{group}", axis)
     bottom, top, up = ("L_BOTTOM", "U_TOP", "y") if mesh.dim == 2 else ("L_ZMIN", "U_ZMAX", "z")
-    model.fix(bottom, up)
-    model.prescribe(top, **{up: -0.01})
-    return model
+    return supported(model, **{bottom: up, top: {up: -0.01}})
 
 
 def is_uniform(last, expected, axis):

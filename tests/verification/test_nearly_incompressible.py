@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of
+from models import elastic_model, made_of, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -45,8 +45,7 @@ def pad(element, n, kinematics="plane_strain", solver="direct"):
     mesh = mesh.replace(points=mesh.points - mesh.points.min(axis=0))
     model = elastic_model(mesh, kinematics, E=3.0, nu=NU)
     bottom, top, up = ("ZMIN", "ZMAX", "z") if solid else ("BOTTOM", "TOP", "y")
-    model.fix(bottom, "xyz"[: mesh.dim])
-    model.fix(top, "xy" if solid else "x")
+    supported(model, **{bottom: "xyz"[: mesh.dim], top: "xy" if solid else "x"})
     model.prescribe(top, **{up: -0.01})
     for group, axis in (("XMIN", "x"), ("YMIN", "y")) if solid else (("LEFT", "x"),):
         model.fix(group, axis)  # symmetry

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from images import Image, image_of
-from models import made_of, supported
+from models import elastic_model, made_of, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -226,9 +226,7 @@ def test_a_closed_node_that_slides_past_the_end_has_the_gap_of_its_twin(formulat
     mesh = fc.generate.block_on_block(
         "quad4", size_lower=(6.0, 2.0), size_upper=(6.0, 2.0), divisions_lower=(6, 2), divisions_upper=(6, 2)
     )
-    model = fc.Model(mesh, kinematics="plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
     for side in ("LOWER", "UPPER"):
         model.add_periodicity(f"{side}_LEFT", f"{side}_RIGHT")
     model.add_pressure("UPPER_TOP", 5.0)
@@ -502,8 +500,7 @@ def test_pretension_of_two_bodies_cut_in_one_plane():
     mesh = mesh.with_facet_group("CUT", lambda x: abs(x[:, 2] - 1.0) < 1e-9, between=True)
     model = ring(fc.generate.cut(mesh, "CUT"), "3d")
     for name in "AB":
-        model.fix(f"{name}_ZMIN", "xyz")
-        model.fix(f"{name}_ZMAX", "xyz")
+        supported(model, **{f"{name}_ZMIN": "xyz", f"{name}_ZMAX": "xyz"})
     model.add_pretension("both", "CUT", shortening=0.01)
     section = model.pretensions[0]
     body = fc.mesh.topology.bodies(model.mesh)[1]

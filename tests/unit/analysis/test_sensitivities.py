@@ -183,8 +183,7 @@ def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     centre = {"plane_strain": (4.3, 13.0), "axisymmetric": (0.0, 13.0), "3d": (3.3, 4.1, 13.0)}[kinematics]
 
     def make(pushed=False, E=1000.0, nu=0.3, motion=1.0, force=1.0):
-        model = elastic_model(mesh, kinematics, E=E, nu=nu)
-        model.fix(bottom, "xyz"[:dim])
+        model = elastic_model(mesh, kinematics, E=E, nu=nu, **{bottom: "xyz"[:dim]})
         across = {} if kinematics == "axisymmetric" else {"motion": {"x": 0.1 * motion}}
         driving = {"force": {up: -60.0 * force}, **across} if pushed else {"motion": {up: -0.3 * motion}}
         ball = fc.obstacles.Sphere(centre=centre, R=8.0)
@@ -215,8 +214,7 @@ def test_sides_that_end_in_planes_of_symmetry(angle, multipliers, secondary):
         model = fc.Model(mesh, kinematics="plane_strain")
         model.add_material(fc.LinearElastic(E=E, nu=0.3), "INNER")
         model.add_material(fc.LinearElastic(E=70e3, nu=0.33), "OUTER")
-        model.prescribe("SYMMETRY_X", **{"normal" if angle else "x": 0.0})
-        model.prescribe("SYMMETRY_Y", **{"normal" if angle else "y": 0.0})
+        supported(model, SYMMETRY_X={"normal" if angle else "x": 0.0}, SYMMETRY_Y={"normal" if angle else "y": 0.0})
         model.add_pressure("BORE", 20.0 * load)
         sides = {"secondary": f"CONT_{secondary}", "primary": f"CONT_{other}"}
         options = {"clearance": clearance, "formulation": "mortar", "multipliers": multipliers}

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from pairwise import first_of
 from stepping import Stepping
 
@@ -217,8 +217,7 @@ def test_what_fails_inside_a_pairing_is_told_with_the_pairings_before_it(monkeyp
 def problem():
     model = fc.Model(fc.generate.block((1.0, 1.0), (1, 1)), "plane_strain", strain="finite")
     model.add_material(fc.NeoHookean(E=1.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
-    model.prescribe("TOP", y=-0.1)
+    supported(model, BOTTOM="xy", TOP={"y": -0.1})
     return prepare(model, fc.linear_ramp(2), fc.Criteria())
 
 

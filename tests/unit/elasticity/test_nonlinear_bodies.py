@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import made_of
+from models import made_of, supported
 
 import fastcontact as fc
 from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
@@ -131,8 +131,7 @@ def test_initial_states_are_refused() -> None:
 def test_a_body_pressed_to_nothing_says_where() -> None:
     model = fc.Model(fc.generate.block((4.0, 1.0), (4, 1)), "plane_strain", strain="finite")
     model.add_material(fc.NeoHookean(E=100.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
-    model.prescribe("TOP", x=0.0, y=-1.2)
+    supported(model, BOTTOM="xy", TOP={"x": 0.0, "y": -1.2})
     with pytest.raises(fc.ConvergenceError, match=r"cell \d of quad4 near \[.*\] is inverted .J = -"):
         fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
 

@@ -158,8 +158,7 @@ def told(model, ramp=None):
 def test_a_side_pushed_into_a_floor_is_refused(mesh, kinematics, side, formulation):
     model = elastic_model(mesh, kinematics)
     up = "yz"[mesh.dim - 2]
-    model.prescribe(side, **{up: -0.1})
-    model.fix("LEFT" if mesh.dim == 2 else "XMIN", "x")
+    supported(model, **{side: {up: -0.1}, "LEFT" if mesh.dim == 2 else "XMIN": "x"})
     model.add_obstacle("floor", secondary=side, obstacle=floor(mesh.dim), formulation=formulation)
     n = len(mesh.points_of(side))
     with pytest.raises(fc.ModelError, match=rf"push {n} of the {n} nodes of '{side}' into the rigid .* by up to 0\.1 "):

@@ -140,9 +140,7 @@ def test_a_part_that_repeats_itself_keeps_its_ends_together(dim):
     low, high = ("LEFT", "RIGHT") if dim == 2 else ("XMIN", "XMAX")
     model.relate_groups(low, high, "xyz"[:dim])
     bottom, top = ("BOTTOM", "TOP") if dim == 2 else ("YMIN", "YMAX")
-    model.fix(bottom, "y")
-    model.prescribe(top, y=-0.3)
-    model.prescribe("BOTTOM_LEFT" if dim == 2 else "XMIN", **({"x": 0.0}))
+    supported(model, **{bottom: "y", top: {"y": -0.3}, "BOTTOM_LEFT" if dim == 2 else "XMIN": {"x": 0.0}})
     if dim == 3:
         supported(model, ZMIN="z", ZMAX="z")
     step = last(model)

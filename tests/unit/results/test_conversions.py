@@ -282,8 +282,7 @@ def bars(element, first=0, softer=None):
     for number in (first, 1 - first):
         model.add_material(fc.LinearElastic(MODULI[number] if softer is None else softer, 0.0), groups=[f"BAR{number}"])
     up = "z" if solid else "y"
-    model.fix("ZMIN" if solid else "BOTTOM", up)
-    model.fix("XMIN" if solid else "LEFT", "x")
+    supported(model, **{"ZMIN" if solid else "BOTTOM": up, "XMIN" if solid else "LEFT": "x"})
     if solid:
         model.fix("YMIN", "y")
     model.prescribe("ZMAX" if solid else "TOP", **{up: STRAIN})
