@@ -5,6 +5,7 @@ import pytest
 from images import Image, image_of
 from models import elastic_model, made_of, supported
 from pairwise import first_of
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box, merge_points, renamed, union
@@ -148,8 +149,7 @@ def test_a_sector_that_nothing_stops_from_turning_is_refused():
     model = ring(sector(6))
     model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=6)
     model.add_pressure("BOTTOM", 1.0)
-    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'BLOCK': .*rotation"):
-        fc.solve(model, 1)
+    refused(fc.ModelError, r"1 rigid-body motion is not supported: body 'BLOCK': .*rotation", fc.solve, model, 1)
 
 
 def wavy(begin, form, periodic=True, divisions=(96, 32)):
@@ -368,14 +368,10 @@ def test_ends_that_do_not_match_are_refused():
         model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=6)
     with pytest.raises(fc.ModelError, match=r"from the nearest node of .TOP., and the groups do not consist of facets"):
         model.add_cyclic_symmetry("LEFT", "TOP", sectors=5)
-    with pytest.raises(fc.ModelError, match="needs at least two sectors"):
-        model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=1)
-    with pytest.raises(fc.ModelError, match=r"lies .* from the nearest node of 'RIGHT'"):
-        model.add_periodicity("LEFT", "RIGHT")
-    with pytest.raises(fc.ModelError, match="a period has two ends"):
-        model.add_periodicity("LEFT", "LEFT")
-    with pytest.raises(fc.ModelError, match="'x' is free, so no displacement"):
-        model.add_periodicity("LEFT", "RIGHT", x=0.1, free="x")
+    refused(fc.ModelError, "needs at least two sectors", model.add_cyclic_symmetry, "LEFT", "RIGHT", sectors=1)
+    refused(fc.ModelError, r"lies .* from the nearest node of 'RIGHT'", model.add_periodicity, "LEFT", "RIGHT")
+    refused(fc.ModelError, "a period has two ends", model.add_periodicity, "LEFT", "LEFT")
+    refused(fc.ModelError, "'x' is free, so no displacement", model.add_periodicity, "LEFT", "RIGHT", x=0.1, free="x")
     axisymmetric = fc.Model(block(), "axisymmetric")
     with pytest.raises(fc.ModelError, match="already represents the entire ring"):
         axisymmetric.add_cyclic_symmetry("LEFT", "RIGHT", sectors=4)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from models import made_of, supported
+from refusals import refused
 from two_bodies import rings
 
 import fastcontact as fc
@@ -162,15 +163,12 @@ def test_the_estimated_error_of_a_free_body_is_nothing():
 def test_mistakes_are_refused_before_any_numerics():
     model = free(plane("quad4", "plane_strain"), "plane_strain", fc.LinearElastic(E, NU))
     for value, words in ((np.ones(3), r"shape \(3,\)"), (np.nan, "not a finite"), ("hot", "not the string 'hot'")):
-        with pytest.raises(fc.ModelError, match=words):
-            model.add_temperature(value)
+        refused(fc.ModelError, words, model.add_temperature, value)
     with pytest.raises(fc.ModelError, match="not finite at point 2"):
         model.add_temperature(np.where(np.arange(model.mesh.n_points) == 2, np.nan, 1.0))
-    with pytest.raises(fc.ModelError, match="contains no solid cells: it has no temperature"):
-        model.add_temperature(1.0, "TOP")
+    refused(fc.ModelError, "contains no solid cells: it has no temperature", model.add_temperature, 1.0, "TOP")
     model.add_temperature(1.0)
-    with pytest.raises(fc.ModelError, match="acts on 6 solid cells whose material has no coefficient of thermal"):
-        model.check()
+    refused(fc.ModelError, "acts on 6 solid cells whose material has no coefficient of thermal", model.check)
 
 
 def test_an_expansion_that_shears_out_of_the_plane_is_refused():
@@ -178,5 +176,4 @@ def test_an_expansion_that_shears_out_of_the_plane_is_refused():
     material = fc.Orthotropic(*constants, axes=[(1, 0, 1), (0, 1, 0)], expansion=(1e-6, 2e-6, 3e-6))
     model = free(plane("quad4", "plane_strain"), "plane_strain", material)
     model.add_temperature(1.0)
-    with pytest.raises(fc.ModelError, match="causes out-of-plane shear"):
-        model.check()
+    refused(fc.ModelError, "causes out-of-plane shear", model.check)

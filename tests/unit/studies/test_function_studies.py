@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from models import elastic_model, supported
 from pairwise import first_of
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -140,8 +141,7 @@ def test_a_sweep_is_drawn_over_the_first_parameter_with_several_numbers(values, 
     ],
 )
 def test_what_no_study_can_use_is_told(given, message):
-    with pytest.raises(fc.CaseError, match=message):
-        fc.convergence_study(*given[:4], theory=given[4] if len(given) > 4 else None)
+    refused(fc.CaseError, message, fc.convergence_study, *given[:4], theory=given[4] if len(given) > 4 else None)
 
 
 @pytest.mark.parametrize(
@@ -155,8 +155,7 @@ def test_what_no_study_can_use_is_told(given, message):
 )
 def test_options_that_do_not_fit_a_function_are_told(options, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(fc.CaseError, match=message):
-        fc.convergence_study(tube, [0.5, 0.25, 0.125], **options)
+    refused(fc.CaseError, message, fc.convergence_study, tube, [0.5, 0.25, 0.125], **options)
 
 
 def test_a_wrong_quantity_stops_a_sweep_at_its_first_point():
@@ -256,5 +255,4 @@ def test_not_reached_is_said_and_is_exit_code_two(case, capsys):
     ],
 )
 def test_what_is_wrong_is_told(case, options, words):
-    with pytest.raises(fc.CaseError, match=words):
-        fc.adaptive_study(case, **options)
+    refused(fc.CaseError, words, fc.adaptive_study, case, **options)
