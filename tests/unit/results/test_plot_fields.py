@@ -10,6 +10,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from commands import output_of
 from matplotlib_pictures import contact_of, polygons_of, step_of
 from models import elastic_model
 from pairwise import first_of
@@ -448,8 +449,7 @@ def test_the_command_draws_solids(result, tmp_path, options):
 @pytest.mark.slow
 def test_the_command_writes_an_animation(result, tmp_path, capsys):
     target = tmp_path / "a.gif"
-    assert main(["plot", str(result), "--animate", str(target)]) == 0
-    assert f"wrote {target}" in capsys.readouterr().out
+    assert f"wrote {target}" in output_of(capsys, ["plot", str(result), "--animate", str(target)])
     assert len(list(frames(target))) == 2
 
 
@@ -462,15 +462,13 @@ def test_the_command_writes_an_animation(result, tmp_path, capsys):
     ],
 )
 def test_the_command_says_what_is_wrong(result, tmp_path, capsys, options, words):
-    assert main(["plot", str(result), *options, "--png", str(tmp_path / "p.png")]) == 1
-    assert words in capsys.readouterr().err
+    assert words in output_of(capsys, ["plot", str(result), *options, "--png", str(tmp_path / "p.png")], 1)
     assert not list(tmp_path.iterdir())
 
 
 def test_an_animation_is_not_a_picture_too(result, tmp_path, capsys):
     both = ["--animate", str(tmp_path / "a.gif"), "--png", str(tmp_path / "a.png")]
-    assert main(["plot", str(result), *both]) == 1
-    assert "leave out --png" in capsys.readouterr().err
+    assert "leave out --png" in output_of(capsys, ["plot", str(result), *both], 1)
 
 
 def test_an_animation_hands_every_picture_to_ffmpeg(tmp_path, monkeypatch):
