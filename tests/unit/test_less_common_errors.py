@@ -15,7 +15,6 @@ from refusals import refused
 
 import fastcontact as fc
 from fastcontact._tools import paths
-from fastcontact._tools.argument_types import check_type, fits, type_name
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import _outputs, main
 from fastcontact.cli._study import _failing_threads_interrupt
@@ -150,24 +149,6 @@ def test_an_interruption_of_a_run_alone_ends_its_process(monkeypatch):
     assert ended == [True, {"wait": False, "cancel_futures": True}]
 
 
-def test_annotations_of_words_and_of_arrays_with_others():
-    from typing import Literal
-
-    from numpy.typing import ArrayLike
-
-    assert fits("a", Literal["a", "b"])
-    assert not fits(1, Literal["a", "b"])
-    assert fits(2, Literal[1, 2])
-    assert not fits(3, Literal[1, 2])
-    assert not fits([[1.0], [1.0, 2.0]], ArrayLike)
-    mixed = ArrayLike | fc.Mesh
-    assert fits(SQUARE, mixed)
-    assert fits([1.0], mixed)
-    assert type_name(mixed) == "an array of numbers or a Mesh"
-    with pytest.raises(fc.ModelError, match="it must be an array of numbers or a Mesh, not the string 'x'"):
-        check_type("it", "x", mixed, fc.ModelError)
-
-
 def two_materials(path):
     """Write a result with two materials that meet."""
     mesh = fc.generate.block(divisions=(2, 2))
@@ -246,15 +227,6 @@ def test_iterations_that_do_not_get_there_name_other_solvers(monkeypatch):
     monkeypatch.setattr(pyamg, "MAX_ITERATIONS", 1)
     found = elastic_model(fc.generate.block(divisions=(8, 8)), "plane_strain", BOTTOM="xy", TOP={"y": -0.01, "x": 0.02})
     refused(fc.ConvergenceError, r"do not reach .*: use amg or direct", fc.solve, found, 1, linear_solver="pyamg")
-
-
-def test_no_equations_have_no_pivots():
-    from scipy.sparse import csr_array
-
-    from fastcontact.linear.elimination.pivot_order import choose_pivots
-
-    pivots, P = choose_pivots(csr_array((0, 5)))
-    assert (pivots.shape, P.matrix.shape) == ((0,), (0, 0))
 
 
 def test_the_least_tolerance_is_not_lowered():

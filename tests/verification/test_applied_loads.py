@@ -451,22 +451,6 @@ def test_a_box_held_by_friction_alone_in_3d():
     assert len(last.iterations["regularised"]["motions"]) == 6
 
 
-@pytest.mark.parametrize(
-    ("length", "pressure"), first_of(2, [(1e-3, 1e6), (1e6, 1e-9), (2.0**-10, 2.0**20), (2.0**20, 2.0**-30)])
-)
-def test_units_do_not_matter_for_floating_bodies(length, pressure, request):
-    mesh = fc.generate.half_spheres("tri3", size=5.0)
-    results = []
-    for a, p in ((1.0, 1.0), (length, pressure)):
-        model = elastic_model(mesh.replace(points=mesh.points * a), "axisymmetric", E=20_000.0 * p, A1A2="x", A1B1="y")
-        model.add_pressure("A2B2", 50.0 * p)
-        model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="continuous")
-        results.append(fc.solve(model, 1)[-1])
-    one, other = results
-    assert np.abs(one.stress - other.stress / pressure).max() < 1e-9 * np.abs(one.stress).max()
-    assert one.iterations["active_set_iterations"] == other.iterations["active_set_iterations"]
-
-
 def test_a_sub_model_follows_the_stages_of_the_global_model():
     """A block is pressed onto a rigid plane with friction and then sheared; its lower half is solved again on its own."""
 

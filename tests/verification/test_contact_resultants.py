@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, pressed_spheres, supported, united
 from refusals import refused
 
 import fastcontact as fc
@@ -114,9 +114,7 @@ def test_in_space_the_moment_has_three_components():
 
 
 def test_the_area_of_hertz_lies_between_the_brackets_of_the_radius():
-    case = elastic_model(fc.generate.half_spheres(size=2.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
-    case.prescribe("A1B1", y=2.0)
-    case.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    case = pressed_spheres(fc.generate.half_spheres(size=2.0))
     steps = fc.solve(case, 4)
     for step, found in zip(steps, fc.contact_resultants(case, steps, "hertz"), strict=True):
         low, high = step.contact["hertz"].radius

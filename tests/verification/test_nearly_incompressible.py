@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model, made_of, pressed_spheres, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -76,8 +76,7 @@ def hertz(element, nu, coarseness):
     mesh = fc.generate.half_spheres(
         element, arc_sizes=(0.2 * coarseness, 2 * coarseness), segments=int(15 / coarseness)
     )
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, nu=nu, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    model = pressed_spheres(mesh, 1.0, material=fc.LinearElastic(E=20_000.0, nu=nu))
     contact = fc.solve(model, 1)[-1].contact["hertz"]
     return np.array([np.abs(contact.force[1]), contact.pressure.max()])
 

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, pressed_spheres
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
@@ -140,10 +140,9 @@ def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
 
 
 def spheres(friction=0.0):
-    model = elastic_model(fc.generate.half_spheres("tri3", size=8.0), "axisymmetric", E=20_000.0, A1A2="x")
-    supported(model, A2B2={"y": -2.0}, A1B1={"y": 2.0})
-    model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
-    return model
+    return pressed_spheres(
+        fc.generate.half_spheres("tri3", size=8.0), name="pair", formulation="node_to_segment", friction=friction
+    )
 
 
 def pressed(criteria, steps):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from case_texts import HERTZ, UNITS, spheres
 from commands import output_of
-from models import elastic_model, supported
+from models import pressed_spheres, supported
 from new_process import printed
 
 import fastcontact as fc
@@ -410,9 +410,7 @@ def test_a_strict_run_tells_the_checks_that_fail(tmp_path, capsys):
 
 @pytest.mark.filterwarnings("ignore:contact 'ceiling' never closed")
 def test_the_contact_that_was_taken_is_told_where_there_are_two(tmp_path, capsys):
-    case = elastic_model(fc.generate.half_spheres(size=25.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
-    case.prescribe("A1B1", y=2.0)
-    case.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    case = pressed_spheres(fc.generate.half_spheres(size=25.0))
     far = fc.obstacles.HalfSpace((0.0, 500.0), (0.0, -1.0))
     case.add_obstacle("ceiling", secondary="A2B2", obstacle=far)
     path = tmp_path / "two.vtkhdf"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from commands import output_of
 from matplotlib_pictures import contact_of, polygons_of, step_of
-from models import elastic_model
+from models import elastic_model, pressed_spheres
 from pairwise import first_of
 from refusals import refused
 
@@ -394,9 +394,7 @@ def test_a_history_begins_at_zero_and_names_its_theory(steps_of_disc):
 
 @pytest.fixture(scope="module")
 def steps_of_disc():
-    model = elastic_model(fc.generate.half_spheres(size=10.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
-    model.prescribe("A1B1", y=2.0)
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
+    model = pressed_spheres(fc.generate.half_spheres(size=10.0), formulation="node_to_segment")
     return fc.solve(model, 4), "hertz"
 
 

@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from matplotlib_pictures import contact_of
-from models import elastic_model
+from models import elastic_model, pressed_spheres
 from refusals import refused
 
 import fastcontact as fc
@@ -35,10 +35,7 @@ SCREEN = 4000
 
 @pytest.fixture(scope="module")
 def model():
-    found = elastic_model(fc.generate.half_spheres(size=10.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
-    found.prescribe("A1B1", y=2.0)
-    found.add_contact("hertz & co", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
-    return found
+    return pressed_spheres(fc.generate.half_spheres(size=10.0), name="hertz & co", formulation="node_to_segment")
 
 
 @pytest.fixture(scope="module")
