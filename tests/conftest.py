@@ -212,3 +212,16 @@ def small_disk(tmp_path: Path):
         pytest.skip(f"no small file system here: {mounted.stderr.decode().strip()}")
     yield folder
     subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.fixture
+def gmsh():
+    """The module, initialised."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # it is installed, but a library of the system that it needs is not
+        pytest.skip(f"gmsh cannot be imported: {error}")
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    yield gmsh
+    gmsh.finalize()

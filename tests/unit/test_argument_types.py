@@ -16,10 +16,8 @@ WRONG = (None, "5", 5, [1, 2], {"a": 1}, object(), [None], 1j)
 
 
 def model(contact=True):
-    found = pressed_spheres(fc.generate.half_spheres(size=25.0), name=None)
-    if contact:
-        found.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
-    return found
+    name = "hertz" if contact else None
+    return pressed_spheres(fc.generate.half_spheres(size=25.0), name=name, formulation="node_to_segment")
 
 
 def of_model(method):

@@ -116,12 +116,8 @@ def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -
         assert all(np.array_equal(one, two) for one, two in zip(found[0], other, strict=True))
 
 
-def model_with(law, strain: str = "small") -> fc.Model:
-    return made_of(fc.generate.block(), "plane_strain", law, strain=strain)
-
-
 def test_initial_states_are_refused() -> None:
-    model = model_with(PLASTIC)
+    model = made_of(fc.generate.block(), "plane_strain", PLASTIC)
     model.fix("BOTTOM", "xy")
     model.add_initial_stress(xx=20.0)
     with pytest.raises(fc.ModelError, match="initial stresses and strains are available for linear elasticity only"):

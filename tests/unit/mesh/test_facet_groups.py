@@ -164,18 +164,6 @@ def test_without_gmsh_the_message_says_how_to_get_it(monkeypatch):
     refused(fc.FileError, r"gmsh cannot be imported .*: pip install gmsh", fc.from_gmsh)
 
 
-@pytest.fixture
-def gmsh():
-    try:
-        import gmsh
-    except (ImportError, OSError) as error:  # it is installed, but a library of the system that it needs is not
-        pytest.skip(f"gmsh cannot be imported: {error}")
-    gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield gmsh
-    gmsh.finalize()
-
-
 def two_boxes(gmsh):
     """Make a box on a box in gmsh, that do not share nodes; return their tags, and those of the faces between them."""
     low, up = (gmsh.model.occ.addBox(0, 0, z, 1, 1, 1) for z in (0, 1))

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, pressed_spheres, supported
 from pairwise import first_of
 from refusals import refused
 
@@ -34,10 +34,8 @@ def bore(step):
 def overlap(size, friction=0.0):
     """Half-spheres, loaded by Hertz."""
     sizes = {"arc_sizes": (size, 4 * size), "radial_sizes": (size, 4 * size), "segments": 8}
-    model = elastic_model(fc.generate.half_spheres("quad4", **sizes), "axisymmetric", E=20_000.0, nu=NU, A1A2="x")
-    supported(model, A2B2={"y": -0.5}, A1B1={"y": 0.5})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction)
-    return fc.solve(model, 1)
+    mesh, material = fc.generate.half_spheres("quad4", **sizes), fc.LinearElastic(E=20_000.0, nu=NU)
+    return fc.solve(pressed_spheres(mesh, 0.5, material=material, friction=friction), 1)
 
 
 @pytest.mark.parametrize(("element", "order"), [("quad4", 2.0), ("tri3", 2.0)])

@@ -303,7 +303,6 @@ def test_shell_stays_in_space(tmp_path, suffix):
 
 
 def test_missing_file_folder_and_suffix(tmp_path):
-    refused(FileError, r"file '.*none\.vtu'", read_mesh, tmp_path / "none.vtu")
     refused(FileError, "is a folder", read_mesh, tmp_path)
     (tmp_path / "mesh.vtuu").write_text("")
     refused(FileError, r"unknown mesh file suffix '\.vtuu': did you mean '\.vtu'", read_mesh, tmp_path / "mesh.vtuu")

@@ -40,27 +40,18 @@ def test_gmsh_version_1(element, tmp_path):
 
 
 @pytest.mark.parametrize(("version", "binary"), [(2.2, False), (2.2, True), (4.0, False), (4.1, False), (4.1, True)])
-def test_gmsh_versions_of_today(version, binary, tmp_path):
-    try:
-        import gmsh
-    except (ImportError, OSError) as error:
-        pytest.skip(f"gmsh cannot be imported: {error}")
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        box = gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
-        gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(3, [box], name="BODY")
-        if version != 4.0:
-            gmsh.model.addPhysicalGroup(3, [box], name="AGAIN")
-        gmsh.model.addPhysicalGroup(2, [1], name="SIDE")
-        gmsh.model.mesh.generate(3)
-        gmsh.option.setNumber("Mesh.MshFileVersion", version)
-        gmsh.option.setNumber("Mesh.Binary", binary)
-        gmsh.write(str(tmp_path / "a.msh"))
-        expected = fc.from_gmsh()
-    finally:
-        gmsh.finalize()
+def test_gmsh_versions_of_today(gmsh, version, binary, tmp_path):
+    box = gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.model.addPhysicalGroup(3, [box], name="BODY")
+    if version != 4.0:
+        gmsh.model.addPhysicalGroup(3, [box], name="AGAIN")
+    gmsh.model.addPhysicalGroup(2, [1], name="SIDE")
+    gmsh.model.mesh.generate(3)
+    gmsh.option.setNumber("Mesh.MshFileVersion", version)
+    gmsh.option.setNumber("Mesh.Binary", binary)
+    gmsh.write(str(tmp_path / "a.msh"))
+    expected = fc.from_gmsh()
     found = fc.read_mesh(tmp_path / "a.msh")
     assert set(found.group_names) == set(expected.group_names)
     for name in expected.cell_groups:
