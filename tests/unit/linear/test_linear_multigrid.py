@@ -273,6 +273,19 @@ def test_equations_and_springs_change_the_levels_to_those_of_the_eliminated_matr
     assert all(level.springs is None for level in hierarchy.levels)
 
 
+def test_springs_on_one_level_are_part_of_its_factors():
+    K, modes, _, fixed = problem((2, 2, 2))
+    hierarchy = Hierarchy(matrix_of(K), modes)
+    assert len(hierarchy.levels) == 1
+    elimination, T = eliminated(contact_rows(fixed, 3), len(fixed))
+    springs = springs_on(elimination, fixed)
+    ConstrainedHierarchy(hierarchy, matrix_of(K)).constrain(elimination, springs)
+    A = T.T @ (K + springs.rows.T @ diags_array(springs.stiffness) @ springs.rows) @ T
+    b, found = A @ np.random.default_rng(3).normal(size=len(fixed)), np.empty(len(fixed))
+    hierarchy.coarse.solve(b, found)
+    assert np.abs(A @ found - b).max() < 1e-9 * np.abs(b).max()
+
+
 def test_springs_are_kept_and_told_apart():
     rng = np.random.default_rng(2)
     springs = Springs(csr_array(rng.normal(size=(4, 9)) * (rng.random((4, 9)) < 0.6)), 1.0 + rng.random(4))
@@ -298,6 +311,16 @@ def test_springs_side_by_side_may_push_along_other_rows():
         expected = pushed.T @ (one * (R @ u)) + S.T @ (other * (S @ u))
         assert r == pytest.approx(-0.5 * expected)
     assert Springs(R, one).joined(None).rows is R
+
+
+def test_rows_subtracted_from_others():
+    rows = 200
+    A, rng = random_blocks(3, 3, rows, 40)
+    numbers, x, y = rng.permutation(rows).astype(np.int32), rng.normal(size=120), rng.normal(size=3 * rows)
+    expected = y.reshape(-1, 3).copy()
+    expected[numbers] -= (A @ x).reshape(-1, 3)
+    cycle_kernels.subtract_rows(0, rows, numbers, A.indptr, A.indices, (A.data.ravel(),), x, y, (0, 0, 0))
+    assert y == pytest.approx(expected.ravel())
 
 
 def test_many_coupled_equations_are_assigned_unknowns():
