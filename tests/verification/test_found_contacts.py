@@ -180,9 +180,8 @@ def test_softer_bodies_are_secondary_even_with_coarser_meshes(element):
         )
         for name, size, n, y in parts
     )
-    model = fc.Model(union(strip, base), "plane_strain")
-    model.add_material(fc.LinearElastic(E=200e3, nu=0.3), "STRIP")
-    model.add_material(fc.LinearElastic(E=500.0, nu=0.3), "BASE")
+    materials = {"STRIP": fc.LinearElastic(E=200e3, nu=0.3), "BASE": fc.LinearElastic(E=500.0, nu=0.3)}
+    model = made_of(union(strip, base), "plane_strain", materials)
     for body in ("STRIP", "BASE"):
         supported(model, **{f"{body} LEFT": "x", f"{body} RIGHT": "x"})
     model.fix("BASE BOTTOM", "y")

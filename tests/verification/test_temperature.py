@@ -109,10 +109,8 @@ def test_a_held_body_is_pressed_by_its_expansion(element):
 def test_a_heated_shaft_in_a_hub():
     """A shrink fit by heat: the pressure of Lame for the interference (1 + nu) alpha T R of plane strain."""
     mesh = rings("quad8", inner=(1.0, 2.0), divisions=((18, 6), (18, 6)))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(1000.0, 0.3, expansion=ALPHA), "SHAFT")
-    model.add_material(fc.LinearElastic(500.0, 0.25, expansion=ALPHA), "HUB")
-    supported(model, XAXIS="y", YAXIS="x")
+    shaft, hub = (fc.LinearElastic(E, nu, expansion=ALPHA) for E, nu in ((1000.0, 0.3), (500.0, 0.25)))
+    model = made_of(mesh, "plane_strain", {"SHAFT": shaft, "HUB": hub}, XAXIS="y", YAXIS="x")
     model.add_contact("fit", secondary="HUB_INNER", primary="SHAFT_OUTER", formulation="mortar")
     model.add_temperature(RISE, "SHAFT")
     last = solved(model)

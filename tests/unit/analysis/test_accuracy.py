@@ -36,10 +36,8 @@ def stacked(ratio=1.0, friction=0.3, formulation="node_to_segment", dim=3, unit=
         bottom, top = "BOTTOM", "TOP"
     mesh = united(L_=low, U_=up)
     mesh = fc.Mesh(mesh.points * size, mesh.cells, mesh.cell_groups, mesh.point_groups)
-    model = fc.Model(mesh, "3d" if dim == 3 else "plane_strain")
-    model.add_material(fc.LinearElastic(E, 0.3), groups=["L_BLOCK"])
-    model.add_material(fc.LinearElastic(E * ratio, 0.3), groups=["U_BLOCK"])
-    model.fix("L_" + bottom, "xyz"[:dim])
+    materials = {"L_BLOCK": fc.LinearElastic(E, 0.3), "U_BLOCK": fc.LinearElastic(E * ratio, 0.3)}
+    model = made_of(mesh, "3d" if dim == 3 else "plane_strain", materials, **{"L_" + bottom: "xyz"[:dim]})
     moved = {"x": 0.2 * DEPTH * size, "y": 0.0, axis: -DEPTH * size}
     model.prescribe("U_" + top, **moved)
     model.add_contact("c", secondary="U_" + bottom, primary="L_" + top, formulation=formulation, friction=friction)

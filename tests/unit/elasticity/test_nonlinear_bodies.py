@@ -117,8 +117,7 @@ def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_initial_states_are_refused() -> None:
-    model = made_of(fc.generate.block(), "plane_strain", PLASTIC)
-    model.fix("BOTTOM", "xy")
+    model = made_of(fc.generate.block(), "plane_strain", PLASTIC, BOTTOM="xy")
     model.add_initial_stress(xx=20.0)
     with pytest.raises(fc.ModelError, match="initial stresses and strains are available for linear elasticity only"):
         fc.solve(model, 1)
