@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, united
+from models import elastic_model, made_of, pressed_spheres, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -303,10 +303,7 @@ MESHES = {"A": "data/meshes/forma04a.med", "B": "data/meshes/forma04b.med", "C":
 
 
 def half_spheres(mesh, **options):
-    model = elastic_model(fc.read_mesh(MESHES[mesh]), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
-    model.prescribe("A1B1", y=2.0)
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
-    return model
+    return pressed_spheres(fc.read_mesh(MESHES[mesh]), **options)
 
 
 def ball_on_block(element, **options):
