@@ -203,7 +203,7 @@ class Deck:
         angle, _ = largest_rotation(self.model.mesh, step.displacement)
         warn(
             f"{nonlinear.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
-            f"{largest:.3g} and the rotation up to {angle:.3g} radian, whose squares linear kinematics neglect"
+            f"{largest:.3g} and the rotation up to {angle:.3g} rad, whose squares linear kinematics neglect"
         )
 
 
