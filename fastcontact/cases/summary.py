@@ -340,14 +340,14 @@ def _check_lines(check: Mapping[str, Any], units: Mapping[str, str]) -> Iterator
         f"  check {check['name']}: {measured} is {abs(check['deviation']):.3%} from {origin} "
         f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"
     )
-    converged = check["mesh_converged_deviation"]
-    if converged is None:
+    model_error = check["mesh_converged_deviation"]
+    if model_error is None:
         yield text
         return
     distance = f"{check['distance_to_mesh_converged']:+.3%} from the mesh-converged value"
-    yield f"{text}; {distance}, which itself is {converged:+.3%} from the theory"
-    if not check["passed"] and abs(converged) > check["tolerance"]:
+    yield f"{text}; {distance}, which itself is {model_error:+.3%} from the theory"
+    if not check["passed"] and abs(model_error) > check["tolerance"]:
         yield (
             "    reason: the theory is not exact for these bodies: on finer meshes the deviation tends to "
-            f"{converged:+.3%}, more than the {check['tolerance']:.3g} that this check requires"
+            f"{model_error:+.3%}, more than the {check['tolerance']:.3g} that this check requires"
         )

@@ -54,7 +54,7 @@ def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Gap |
 
 
 def add_gap_facets(deck_mesh: DeckMesh) -> None:
-    """Create groups of the facets with the nodes of gap elements; those with the second nodes only if these are in solids.
+    """Create groups of the facets with the first nodes of gap elements, and with the second nodes if these belong to solids.
 
     Raises CaseError if the nodes do not fill whole facets.
     """

@@ -144,7 +144,7 @@ def deck_mesh_of(content: Content) -> DeckMesh:
             )
         if element.solid.conducts and content.heat != "uncoupled":
             raise element.cell.refuse(
-                f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
+                f"elements of type {element.solid.name} conduct heat alone: they need *HEAT TRANSFER in all steps"
             )
     points = deck_mesh.points
     if deck_mesh.dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
@@ -192,7 +192,7 @@ def check_nodes(deck_mesh: DeckMesh, name: str, location: Location) -> None:
     for point in deck_mesh.surface_nodes(definition, scope) if definition.of_nodes else ():
         if point not in deck_mesh.outer_faces:
             raise definition.refuse(
-                f"node {deck_mesh.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
+                f"node {deck_mesh.label_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
             )
 
