@@ -75,7 +75,7 @@ class Building:
         self.sections = sections_by_point(self.assembly)
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
-        conditions.run()
+        conditions.record()
         loads = distributed_loads(self.assembly, conditions.loads) + distributed_loads(self.assembly, conditions.fluxes)
         loads += heat_loads(self.assembly, conditions, self.thickness)
         if not only_heat:
@@ -147,12 +147,12 @@ class Building:
             key = (key_of(section.material), key_of(section.orientation), element.solid.incompatible_modes)
             by_material.setdefault(key, []).append(element)
         materials = []
-        for (name, orientation, modes), members in by_material.items():
+        for (name, orientation, incompatible_modes), members in by_material.items():
             material = self.content.materials[name]
             axes = self._axes(members[0].assigned_section, members)
             group = f"material {material.name}" + (f" along {orientation.lower()}" if orientation else "")
-            group += " with incompatible modes" if modes else ""
-            law = law_of(self.content, material, axes, modes)
+            group += " with incompatible modes" if incompatible_modes else ""
+            law = law_of(self.content, material, axes, incompatible_modes)
             materials.append((law, self.assembly.add_solids(group, members)))
         return materials, thickness or 1.0
 

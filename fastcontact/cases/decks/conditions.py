@@ -39,7 +39,7 @@ class Conditions:
         Temperatures of *TEMPERATURE, and those that *BOUNDARY prescribes where temperatures are computed.
     powers, fluxes, films : Histories
         Nodal heat flows, heat fluxes and volumetric sources, and ambient temperatures of films.
-    of_keyword : dict of str to Histories
+    by_keyword : dict of str to Histories
         Histories of loads and temperatures by keyword.
     histories : tuple of Histories
         All histories.
@@ -60,7 +60,7 @@ class Conditions:
         self.fluxes: Histories[Target] = Histories(content)
         self.films: Histories[Target] = Histories(content, default=self.reference)
         self.film_of: dict[tuple[str, Face | None], Target] = {}
-        self.of_keyword: dict[str, Histories[Any]] = {
+        self.by_keyword: dict[str, Histories[Any]] = {
             "CLOAD": self.forces, "TEMPERATURE": self.given_temperatures, "CFLUX": self.powers,
             **dict.fromkeys(("DLOAD", "DSLOAD"), self.loads), **dict.fromkeys(("DFLUX", "DSFLUX"), self.fluxes),
             **dict.fromkeys(("FILM", "SFILM"), self.films),
@@ -68,14 +68,14 @@ class Conditions:
         self.histories: tuple[Histories[Any], ...] = (
             self.supports,
             self.fixed_temperatures,
-            *dict.fromkeys(self.of_keyword.values()),
+            *dict.fromkeys(self.by_keyword.values()),
         )
         self.directions = local_directions(assembly)
         if assembly.dim == 3:  # rotations refer to the local axes of their node
             rotations, rotated = assembly.rotations, self.directions
             self.directions = {rotations[p]: axes for p, axes in rotated.items() if p in rotations} | rotated
 
-    def run(self) -> None:
+    def record(self) -> None:
         """Record the supports and loads of all steps."""
         for block in self.assembly.content.supports:
             self._supports(block, precedes_steps=True)
@@ -86,7 +86,7 @@ class Conditions:
                 if block.keyword == "BOUNDARY":
                     self._supports(block)
                 else:
-                    self.of_keyword[block.keyword].record(block, map(self._load, block.iter_rows()))
+                    self.by_keyword[block.keyword].record(block, map(self._load, block.iter_rows()))
             for history in self.histories:
                 history.advance(number, step)
 

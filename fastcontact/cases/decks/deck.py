@@ -29,7 +29,7 @@ from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult, Steps
 
 # Attributes of `ContactResult` that are proportional to the thickness of a plane model.
-FORCES = ("force", "force_vectors", "dissipation", "primary_force_vectors")
+EXTENSIVE_FIELDS = ("force", "force_vectors", "dissipation", "primary_force_vectors")
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +166,7 @@ class Deck:
         if t == 1.0:
             return replace(step, reaction=reaction)
         contacts = {
-            name: replace(contact, **{key: t * getattr(contact, key) for key in FORCES})
+            name: replace(contact, **{key: t * getattr(contact, key) for key in EXTENSIVE_FIELDS})
             for name, contact in step.contact.items()
         }
         sums = {name: _scaled(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}

@@ -42,14 +42,14 @@ def spring(content: Content, block: Block) -> None:
 
 def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Gap | Spring], keyword: str) -> None:
     """Raise CaseError if `keyword` gives properties to elements not of type `kind`, or not to all elements of this type."""
-    complete = set()
+    with_properties = set()
     for name, entry in properties.items():
         for element in assembly.elements_of(name, entry.location):
             if element.cell.type != kind:
                 raise entry.refuse(f"element {element.number} is not of type {kind}")
-            complete.add(element)
+            with_properties.add(element)
     for element in assembly.discrete:
-        if element.cell.type == kind and element not in complete:
+        if element.cell.type == kind and element not in with_properties:
             raise element.cell.refuse(f"element {element.number} of type {kind} has no {keyword}")
 
 

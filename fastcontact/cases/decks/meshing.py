@@ -30,7 +30,7 @@ class DeckMesh(Assembly):
         component is the rotation.
     facets : dict of str to list of tuple of int
         Points of the distinct facets by facet type.
-    rows : dict of tuple of int to int
+    row_of_facet : dict of tuple of int to int
         Row of a facet in the list of its type, by its sorted points.
     groups : dict of str to dict of str to list of int
         Groups of cells, as rows by element type.
@@ -42,7 +42,7 @@ class DeckMesh(Assembly):
 
     rotations: dict[int, int] = field(default_factory=dict)
     facets: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)
-    rows: dict[tuple[int, ...], int] = field(default_factory=dict)
+    row_of_facet: dict[tuple[int, ...], int] = field(default_factory=dict)
     groups: dict[str, dict[str, list[int]]] = field(default_factory=dict)
     point_groups: dict[str, Indices] = field(default_factory=dict)
     excluded: dict[str, list[int]] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class DeckMesh(Assembly):
             points = facet_points(element, facet)
             name = elements.get(element.solid.element).facet_elements[facet]
             facets = self.facets.setdefault(name, [])
-            row = self.rows.setdefault(tuple(sorted(points)), len(facets))
+            row = self.row_of_facet.setdefault(tuple(sorted(points)), len(facets))
             if row == len(facets):
                 facets.append(points)
             rows.setdefault(name, []).append(row)
