@@ -59,8 +59,8 @@ def _environment(module: str, constants: list[Any], name: str) -> Any:
     """Return the Numba environment of a compiled function, which contains its constants, by the name of the function."""
     environment = lookup_environment(name)
     if environment is None:
-        names = {"__name__": module} if module.startswith("numba.") else vars(importlib.import_module(module))
-        environment = Environment(names)
+        module_globals = {"__name__": module} if module.startswith("numba.") else vars(importlib.import_module(module))
+        environment = Environment(module_globals)
         environment.consts[:] = constants
         environment.env_name = name
         Environment._memo[name] = environment
@@ -114,7 +114,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
         return signature, codegen.magic_tuple(), digests
 
     def load(self, key: Any) -> Any:
-        """Return the stored kernel of a signature, after waiting for a helper that compiles it; None if there is none."""
+        """Return the stored kernel of a signature or None, after waiting for a helper process that compiles it."""
         path = self._path(key)
         while not path.exists() and compiling.wait(self._name):
             pass
@@ -157,10 +157,10 @@ class KernelFiles(_Cache):  # type: ignore[misc]
 
     @cached_property
     def version(self) -> str:
-        """Name of the kernel with a digest of everything except signature and processor that determines its machine code."""
-        environment = {name: getattr(numba.config, name, None) for name in OPTIONS}
-        settings = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
-        dependencies = "\n".join([*settings, *sorted(set(_sources(self._function, set())))])
+        """Name of the kernel with a digest of all that determines its machine code, apart from signature and processor."""
+        config = {name: getattr(numba.config, name, None) for name in OPTIONS}
+        settings = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(config)]
+        dependencies = "\n".join([*settings, *sorted(set(_dependencies(self._function, set())))])
         return f"{self._name}.{_digest(dependencies.encode())[:24]}"
 
 
@@ -248,8 +248,8 @@ def _digest_of_file(path: str) -> str:
     return _digest(Path(path).read_bytes())
 
 
-def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
-    """Yield the sources on which the machine code of a function depends.
+def _dependencies(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
+    """Yield strings that identify the code and the constants on which the machine code of a function depends.
 
     These are the digests of the files of the function and of the kernels and intrinsics that it calls, and the constants that
     are compiled into them.
@@ -264,6 +264,6 @@ def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
         # `py_func` is the function of a kernel, and `_defn` that of an intrinsic.
         called = getattr(value, "py_func", None) or getattr(value, "_defn", None)
         if called is not None:
-            yield from _sources(called, seen)
+            yield from _dependencies(called, seen)
         elif isinstance(value, CONSTANTS):
             yield f"{name} = {value.tobytes() if isinstance(value, np.ndarray) else value!r}"

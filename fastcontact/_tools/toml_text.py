@@ -55,7 +55,7 @@ def _value(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):
-        return repr(value)  # has all digits, and is inf or nan as in TOML
+        return repr(value)  # `repr` keeps all digits, and writes inf and nan as TOML does
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):

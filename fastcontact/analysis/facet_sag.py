@@ -91,7 +91,7 @@ def _inclination(pair: Formulation, configuration: Configuration, contact: Conta
     if share <= RELATIVE_ERROR_LIMIT[1] or error <= NOTABLE * total:
         return ""
     return (
-        f"facets of the primary side are inclined to the smooth surface, by {np.abs(inclination).max():.2g} radian along the "
+        f"facets of the primary side are inclined to the smooth surface, by {np.abs(inclination).max():.2g} rad along the "
         f"friction, which changes tangential forces by about {share:.0%} of the friction limit: use the default formulation, "
         "surface_smoothing=True, or smaller facets"
     )

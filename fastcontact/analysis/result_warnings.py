@@ -343,7 +343,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
     angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
     if angle**2 > NEGLECTED:  # the change of area that linear kinematics neglect
         yield (
-            f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
+            f"the largest rotation is {angle:.3f} rad, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
     elif angle > 0.5 * OUT_OF_BALANCE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
@@ -577,7 +577,7 @@ def _neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Ite
     if ratio[worst] > NEGLECTED:
         name = body_name(mesh, bodies(mesh)[1], worst)
         yield (
-            f"rotations of up to {angle:.2g} radian matter in body {name}: on the strains that linear kinematics neglect its "
+            f"rotations of up to {angle:.2g} rad matter in body {name}: on the strains that linear kinematics neglect its "
             f"stresses would do {ratio[worst]:.0%} of their work on strains. Solve the model with strain='finite'"
         )
         return
@@ -588,7 +588,7 @@ def _neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Ite
     if capacity[worst] > 0.0 and error[worst] > OUT_OF_BALANCE:
         name = body_name(mesh, bodies(mesh)[1], worst)
         yield (
-            f"moments of friction on body {name} are wrong by up to {error[worst]:.1%}: it rotates by {angle:.2g} radian, "
+            f"moments of friction on body {name} are wrong by up to {error[worst]:.1%}: it rotates by {angle:.2g} rad, "
             "and linear kinematics apply forces at undeformed positions. Solve the model with strain='finite'"
         )
 

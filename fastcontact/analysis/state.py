@@ -17,13 +17,14 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 
 # Keys of restart data, with the attributes of `State` that they store: data of each contact pair, and numbers. Then the
-# attributes that are stored under their names: those with arrays, and those with instances of a class.
+# attributes that are stored under their names: those with arrays, of which early versions stored only some, and those with
+# instances of a class.
 PAIR_DATA = {
     "closed": "never_opening", "now": "obstacles", "first_contact": "first_contact", "elastic_slip": "elastic_slip",
     "angle": "angles", "slipped": "slipped", "worn": "worn",
 }  # fmt: skip
 NUMBERS = {"largest_force": "largest_force", "largest_work": "largest_rigid_force", "round_off": "gap_round_off"}
-ARRAYS = ("locked", "history", "active", "pressure")
+REQUIRED_ARRAYS, ARRAYS = ("active", "pressure"), ("locked", "history")
 CLASSES: dict[str, type[Bond | ContactForces]] = {"bonds": Bond, "forces": ContactForces}
 
 
@@ -140,7 +141,7 @@ class State:
             "work": None if self.work is None else dataclasses.asdict(self.work),
             "flow": list(self.flow),
             **({} if self.rise is None else {"rise": self.rise.copy(), "instant": self.instant}),
-            **{name: dict(getattr(self, name)) for name in ARRAYS},
+            **{name: dict(getattr(self, name)) for name in (*REQUIRED_ARRAYS, *ARRAYS)},
             **{name: {pair: vars(data) for pair, data in getattr(self, name).items()} for name in CLASSES},
             "pairs": {
                 pair: {
@@ -172,6 +173,7 @@ class State:
             name: {pair: _from_list(key, entry[key]) for pair, entry in pairs.items() if entry.get(key) is not None}
             for key, name in PAIR_DATA.items()
         }
+        pair_data |= {name: dict(data[name]) for name in REQUIRED_ARRAYS}
         pair_data |= {name: dict(data.get(name, {})) for name in ARRAYS}
         for name, kind in CLASSES.items():
             pair_data[name] = {pair: kind(**entry) for pair, entry in data.get(name, {}).items()}

@@ -420,8 +420,8 @@ def _theories(
             text = "must be more than 0 and at most 1: 0.25 for a quarter of the contact"
             raise CaseError(f"theory.{pair}.share = {entry['share']:g} {text}")
         if "mesh_converged" in entry:
-            converged = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"], kinematics)
-            theories[pair]["mesh_converged"] = converged
+            solution = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"], kinematics)
+            theories[pair]["mesh_converged"] = solution
         if "approach" in constants:
             approach[pair] = float(constants["approach"])
     return theories, approach

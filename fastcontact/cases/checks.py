@@ -20,7 +20,7 @@ Table = Mapping[str, Any]  # of a case file
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
 # Quantities that exist in three dimensions only.
-ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
+ONLY_IN_3D = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
 # Quantities that require an option of the pair: the option, and the message if it is missing.
 REQUIRED_OPTIONS = {
     "torque": ("rotation", "only an obstacle with a 'rotation' has one"),
@@ -45,7 +45,7 @@ def _bracket_midpoint(bracket: tuple[float, float]) -> float:
 
 
 def _contact_field(field: str) -> Callable[[StepResult, int], float]:
-    """Return a function of step and point: the magnitude of a contact field, or NaN if it is on no secondary side."""
+    """Return a function of step and point: the magnitude of a contact field; NaN if the point is on no secondary side."""
 
     def value(step: StepResult, point: int) -> float:
         contact, row = at_point(step, point) or (None, 0)
@@ -191,9 +191,9 @@ def read_check(
 
 def defined(names: Collection[str], kinematics: str) -> list[str]:
     """Return those `names` of quantities that the kinematics define; plane models have no force along z."""
-    omitted: tuple[str, ...] = () if kinematics == "3d" else ONLY_IN_SPACE
+    omitted: tuple[str, ...] = () if kinematics == "3d" else ONLY_IN_3D
     if kinematics == "axisymmetric":  # moments and radial forces cancel over the circle
-        omitted = (*ONLY_IN_SPACE, "moment.z", "force.x")
+        omitted = (*ONLY_IN_3D, "moment.z", "force.x")
     return [name for name in names if name not in omitted]
 
 
@@ -230,7 +230,7 @@ def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theorie
     theory = theories[check.theory] if check.theory else {}
     value, target = check.factor * measured(check.quantity, step, probes), check.target(theory.get("theory"))
     solution = theory.get("mesh_converged")
-    converged = check.target(solution) if hasattr(solution, check.of) else None
+    mesh_converged = check.target(solution) if hasattr(solution, check.of) else None
     return {
         "name": check.name,
         "quantity": check.quantity,
@@ -242,6 +242,6 @@ def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theorie
         "deviation": value / target - 1.0,
         "tolerance": check.tolerance,
         "passed": bool(abs(value / target - 1.0) <= check.tolerance),
-        "distance_to_mesh_converged": value / converged - 1.0 if converged is not None else None,
-        "mesh_converged_deviation": converged / target - 1.0 if converged is not None else None,
+        "distance_to_mesh_converged": None if mesh_converged is None else value / mesh_converged - 1.0,
+        "mesh_converged_deviation": None if mesh_converged is None else mesh_converged / target - 1.0,
     }

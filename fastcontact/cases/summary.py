@@ -57,9 +57,9 @@ def summarise(
         **({"cell_fields": {k: _bounds(values) for k, values in last.cell_fields.items()}} if last.cell_fields else {}),
         **({} if last.temperature is None else {"heat": _heat(last)}),
         "theory": {
-            pair: _theory_deviations(last.contact[pair], case.approach.get(pair), **theories)
-            for pair, theories in case.theories.items()
-            if pair in last.contact and all(hasattr(theories["theory"], name) for name in COMPARED)
+            pair: _theory_deviations(last.contact[pair], case.approach.get(pair), **comparison)
+            for pair, comparison in case.theories.items()
+            if pair in last.contact and all(hasattr(comparison["theory"], name) for name in COMPARED)
         },
         "sensitivities": [_sensitivity(case, last, *sensitivity) for sensitivity in case.sensitivities],
         "regularised": last.iterations.get("regularised"),
@@ -135,21 +135,21 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
     }
 
 
-def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _resultants(case: Case, last: StepResult, pair: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the contact resultants of a pair in the last step, and its frictional work in all `steps` [energy]."""
-    (resultants,) = contact_resultants(case.model, [last], name)
+    (resultants,) = contact_resultants(case.model, [last], pair)
     return {
         **{name: _json_value(getattr(resultants, name)) for name in RESULTANTS},
-        "friction_work": sum(step.get("dissipation", {}).get(name, 0.0) for step in steps),
+        "friction_work": sum(step.get("dissipation", {}).get(pair, 0.0) for step in steps),
     }
 
 
 def _json_value(value: Any) -> Any:
     """Return a number or the list of the numbers of an array, with None in place of NaN and infinity."""
-    return [finite(member) for member in value] if np.ndim(value) else finite(value)
+    return [finite_or_none(member) for member in value] if np.ndim(value) else finite_or_none(value)
 
 
-def finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
     """Return a finite number unchanged, and None for NaN and infinity, which JSON cannot represent."""
     return float(value) if np.isfinite(value) else None
 
@@ -192,14 +192,14 @@ def _theory_deviations(
 
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
     """Return the quantities of a theory, and the relative deviations [-] of the computed ones; None if they are undefined."""
-    exact = {name: finite(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip is unbounded
-    deviation = {name: finite(computed[name] / value - 1.0) if value else None for name, value in exact.items()}
+    exact = {name: finite_or_none(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip is unbounded
+    deviation = {name: finite_or_none(computed[name] / value - 1.0) if value else None for name, value in exact.items()}
     return {**exact, "deviation": deviation}
 
 
 def lines(summary: Mapping[str, Any]) -> list[str]:
     """Return the summary as lines of text."""
-    unit = summary["units"]
+    units = summary["units"]
     steps = summary["steps"]
     rows = [
         f"{summary['title']}",
@@ -209,21 +209,21 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     ]
     if substeps := [len(s["substeps"]) for s in steps if "substeps" in s]:
         steps_text = count(len(substeps), "load step")
-        rows.append(f"  {steps_text} did not converge as a whole, {sum(substeps)} substeps instead")
+        rows.append(f"  {steps_text} did not converge as a whole, and took {sum(substeps)} substeps instead")
     peak = summary["von_mises_max"]
     loaded = peak["value"] > 0.0 or "heat" not in summary  # heat conduction alone has no forces
     for name, contact in summary["contact"].items() if loaded else ():
-        rows += _contact_lines(name, contact, unit)
+        rows += _contact_lines(name, contact, units)
     for name, section in steps[-1].get("pretension", {}).items():
         rows.append(
-            f"  pretension '{name}': force {value_text(section['force'], unit, 'force', 6)}, shortened by "
-            + value_text(section["shortening"], unit, "length", 6)
+            f"  pretension '{name}': force {value_text(section['force'], units, 'force', 6)}, shortened by "
+            + value_text(section["shortening"], units, "length", 6)
         )
     if loaded:
         position = ", ".join(f"{x:.4g}" for x in peak["at"])
         rows.append(
-            f"  largest von Mises stress {value_text(peak['value'], unit, 'pressure', 6)} at "
-            + with_unit(f"({position})", unit, "length")
+            f"  largest von Mises stress {value_text(peak['value'], units, 'pressure', 6)} at "
+            + with_unit(f"({position})", units, "length")
         )
     for name, (low, high) in summary.get("cell_fields", {}).items():
         rows.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
@@ -236,7 +236,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     if report := summary["regularised"]:
         rows.append(
             f"  held by contact alone: {grouped(report['motions'])}. Regularised by springs of "
-            f"{value_text(report['spring_stiffness'], unit, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} "
+            f"{value_text(report['spring_stiffness'], units, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} "
             "of the load at the end"
         )
     for name, theory in summary["theory"].items():
@@ -245,7 +245,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     if "modes" in summary:
         rows += _mode_lines(summary["modes"])
     for check in summary["checks"]:
-        rows += _check_lines(check, unit)
+        rows += _check_lines(check, units)
     return rows
 
 
@@ -267,32 +267,33 @@ def count(number: int, noun: str) -> str:
     return f"{number} {noun}" + "s" * (number != 1)
 
 
-def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> Iterator[str]:
+def _contact_lines(name: str, contact: Mapping[str, Any], units: Mapping[str, str]) -> Iterator[str]:
     """Yield the lines of a contact pair or a rigid obstacle."""
     lower, upper = contact["radius"]
-    force = force_text(contact["force_vector"], contact["force_parts"], contact["normal_force"], unit)
+    force = force_text(contact["force_vector"], contact["force_parts"], contact["normal_force"], units)
     yield (
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
-        f"{value_text(contact['pressure_max'], unit, 'pressure', 6)}, {_extent_text(contact['extent'], lower, upper, unit)}"
+        f"{value_text(contact['pressure_max'], units, 'pressure', 6)}, {_extent_text(contact['extent'], lower, upper, units)}"
     )
     if any(contact["obstacle_displacement"] or ()):
         components = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
-        yield f"  obstacle '{name}' is displaced by {with_unit(f'({components})', unit, 'length')}"
+        yield f"  obstacle '{name}' is displaced by {with_unit(f'({components})', units, 'length')}"
     if "torque" in contact:
         yield (
-            f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
-            + value_text(contact["torque"], unit, "moment", 6)
+            f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} rad, with a torque of "
+            + value_text(contact["torque"], units, "moment", 6)
         )
     if "wear_max" in contact:
-        yield f"  contact '{name}' is worn by up to {value_text(contact['wear_max'], unit, 'length')}"
+        yield f"  contact '{name}' is worn by up to {value_text(contact['wear_max'], units, 'length')}"
     if contact["penalty"] is not None:
-        yield (
-            f"  contact '{name}' penetrates by up to {value_text(contact['penetration'], unit, 'length')}, with a penalty of "
-            + (value_text(contact["penalty"], unit, "penalty") if isinstance(contact["penalty"], float) else "its law")
-        )
+        penalty, law = contact["penalty"], "pressure-overclosure law"
+        if isinstance(penalty, float):
+            law = f"penalty of {value_text(penalty, units, 'penalty')}"
+        depth = value_text(contact["penetration"], units, "length")
+        yield f"  contact '{name}' penetrates by up to {depth}, with a {law}"
 
 
-def _extent_text(extent: str, lower: float | None, upper: float | None, unit: Mapping[str, str]) -> str:
+def _extent_text(extent: str, lower: float | None, upper: float | None, units: Mapping[str, str]) -> str:
     """Return the bounds [length] of the radius or the half-width of a contact as text; `extent` states which.
 
     The lower bound is None in an open contact, the upper bound if the contact reaches the end of the surface.
@@ -300,8 +301,8 @@ def _extent_text(extent: str, lower: float | None, upper: float | None, unit: Ma
     if lower is None:
         return "open"
     if upper is None:
-        return f"{extent} {value_text(lower, unit, 'length')}, to the end of the surface"
-    return f"{extent} {lower:.4g} to {value_text(upper, unit, 'length')}"
+        return f"{extent} {value_text(lower, units, 'length')}, to the end of the surface"
+    return f"{extent} {lower:.4g} to {value_text(upper, units, 'length')}"
 
 
 def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str]:
@@ -312,7 +313,7 @@ def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str
         "mesh_converged": "mesh-converged solution",
     }
     if theory["equal_approach"]["approach"] is None:
-        titles["equal_approach"] = "the theory given"
+        titles["equal_approach"] = "the given theory"
     formats = {"force": "force {:+.3%}", "pressure_max": "largest pressure {:+.3%}", "radius": f"{extent} {{:+.2%}}"}
     return [
         f"  contact '{pair}' against {titles[key]}: "
@@ -326,27 +327,27 @@ def _sensitivity_line(report: Mapping[str, Any]) -> str:
     quantity = " ".join(map(str, report["quantity"]))
     if "refused" in report:
         return f"  no sensitivities of {quantity}: {report['refused']}"
-    changes = ", ".join(f"{' '.join(map(str, d['by']))} {d['value']:.6g}" for d in report["derivatives"])
-    return f"  sensitivities of {quantity}, now {report['value']:.6g}: by {changes}"
+    derivatives = ", ".join(f"{d['value']:.6g} to {' '.join(map(str, d['by']))}" for d in report["derivatives"])
+    return f"  sensitivities of {quantity} (value {report['value']:.6g}): {derivatives}"
 
 
-def _check_lines(check: Mapping[str, Any], unit: Mapping[str, str]) -> Iterator[str]:
+def _check_lines(check: Mapping[str, Any], units: Mapping[str, str]) -> Iterator[str]:
     """Yield the result of a check, and an explanation if the theory rather than the mesh causes its failure."""
     verdict = "within" if check["passed"] else "NOT within"
     origin = "the theory's" if check["of"] else "the documented"
-    measured = value_text(check["value"], unit, check["unit"], 6)
+    measured = value_text(check["value"], units, check["unit"], 6)
     text = (
         f"  check {check['name']}: {measured} is {abs(check['deviation']):.3%} from {origin} "
         f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"
     )
-    converged = check["mesh_converged_deviation"]
-    if converged is None:
+    model_error = check["mesh_converged_deviation"]
+    if model_error is None:
         yield text
         return
     distance = f"{check['distance_to_mesh_converged']:+.3%} from the mesh-converged value"
-    yield f"{text}; {distance}, which itself is {converged:+.3%} from the theory"
-    if not check["passed"] and abs(converged) > check["tolerance"]:
+    yield f"{text}; {distance}, which itself is {model_error:+.3%} from the theory"
+    if not check["passed"] and abs(model_error) > check["tolerance"]:
         yield (
             "    reason: the theory is not exact for these bodies: on finer meshes the deviation tends to "
-            f"{converged:+.3%}, more than the {check['tolerance']:.3g} that this check requires"
+            f"{model_error:+.3%}, more than the {check['tolerance']:.3g} that this check requires"
         )

@@ -58,7 +58,7 @@ class PairOptions:
         Traction-separation law; None means that the pair has no tension.
     source : ndarray of bool (n_points,), optional
         Nodes at the source of a penetrating fluid; None without fluid.
-    same_place : ndarray of int (n_points,), optional
+    representatives : ndarray of int (n_points,), optional
         In periodic models, the node with which each node shares its multiplier.
     turning : Rotation, optional
         Rotation about the axis of a cyclic sector. Fields of tractions are then interpolated in cylindrical components,
@@ -80,7 +80,7 @@ class PairOptions:
     obstacle_temperature: float | None = None
     cohesion: CohesiveLaw | None = None
     source: Mask | None = None
-    same_place: Indices | None = None
+    representatives: Indices | None = None
     turning: Rotation | None = None
 
     def friction_axes(

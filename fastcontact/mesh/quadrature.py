@@ -38,28 +38,28 @@ def triangle_1() -> Rule:
 
 
 def triangle_3() -> Rule:
-    """Return the rule with three interior points of the triangle, exact to degree 2 (Strang and Fix, 1973)."""
+    """Return the three-point rule on the triangle, with interior points, exact to degree 2 (Strang and Fix, 1973)."""
     return np.array([[1.0, 1.0], [4.0, 1.0], [1.0, 4.0]]) / 6.0, np.full(3, 1.0 / 6.0)
 
 
 def triangle_6() -> Rule:
-    """Return the rule with six interior points of the triangle, exact to degree 4 (Dunavant, 1985)."""
+    """Return the six-point rule on the triangle, with interior points, exact to degree 4 (Dunavant, 1985)."""
     return _symmetric([], [(0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)], [])
 
 
 def triangle_3_sides() -> Rule:
-    """Return the rule with the midpoints of the sides of the triangle, exact to degree 2 (Strang and Fix, 1973)."""
+    """Return the three-point rule on the triangle, with midpoints of sides, exact to degree 2 (Strang and Fix, 1973)."""
     return np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]]) / 2.0, np.full(3, 1.0 / 6.0)
 
 
 def triangle_7() -> Rule:
-    """Return the rule with seven interior points of the triangle, exact to degree 5 (Radon, 1948)."""
+    """Return the seven-point rule on the triangle, with interior points, exact to degree 5 (Radon, 1948)."""
     roots = np.sqrt(15.0) * np.array([1.0, -1.0])
     return _symmetric([9.0 / 40.0], [((155.0 + root) / 1200.0, (6.0 + root) / 21.0) for root in roots], [])
 
 
 def triangle_12() -> Rule:
-    """Return the rule with twelve interior points of the triangle, exact to degree 6 (Dunavant, 1985)."""
+    """Return the twelve-point rule on the triangle, with interior points, exact to degree 6 (Dunavant, 1985)."""
     return _symmetric(
         [],
         [(0.1167862757263978, 0.2492867451708992), (0.05084490637020978, 0.06308901449150417)],
@@ -68,7 +68,7 @@ def triangle_12() -> Rule:
 
 
 def triangle_16() -> Rule:
-    """Return the rule with sixteen interior points of the triangle, exact to degree 8 (Dunavant, 1985)."""
+    """Return the sixteen-point rule on the triangle, with interior points, exact to degree 8 (Dunavant, 1985)."""
     return _symmetric(
         [0.144315607677777],
         [
@@ -103,7 +103,7 @@ def triangle(degree: int) -> Rule:
 
 
 def triangle_7_closed() -> Rule:
-    """Return the rule with the corners, the midpoints of the sides and the centroid of the triangle.
+    """Return the seven-point rule on the triangle, with the corners, the midpoints of the sides and the centroid.
 
     It is exact to degree 3, and all weights are positive (Hammer and Stroud, 1956).
     """
@@ -121,7 +121,7 @@ def quartered_triangle(rule: Rule) -> Rule:
 
 def square(rule: Rule) -> Rule:
     """Return the product of a rule on [-1, 1] with itself."""
-    return prism(rule, rule)
+    return tensor_product(rule, rule)
 
 
 def _merged(points: Array, weights: Array) -> Rule:
@@ -134,7 +134,7 @@ def _merged(points: Array, weights: Array) -> Rule:
 
 def gauss_cube(n: int) -> Rule:
     """Return the tensor-product Gauss rule with n x n x n points on [-1, 1]^3, exact to degree 2n - 1 in each coordinate."""
-    points, weights = prism(gauss_square(n), gauss_line(n))
+    points, weights = tensor_product(gauss_square(n), gauss_line(n))
     return points[:, ::-1].copy(), weights  # the points along z are consecutive
 
 
@@ -144,7 +144,7 @@ def tetrahedron_1() -> Rule:
 
 
 def tetrahedron_5() -> Rule:
-    """Return the rule with five points of the tetrahedron, exact to degree 3 (Hammer, Marlowe and Stroud, 1956).
+    """Return the five-point rule on the tetrahedron, exact to degree 3 (Hammer, Marlowe and Stroud, 1956).
 
     The weight of the centroid is negative.
     """
@@ -153,7 +153,7 @@ def tetrahedron_5() -> Rule:
     return np.array(points), np.array([-2.0 / 15.0] + [3.0 / 40.0] * 4)
 
 
-def prism(base: Rule, line: Rule) -> Rule:
+def tensor_product(base: Rule, line: Rule) -> Rule:
     """Return the product of a rule on a base in the first coordinates with a rule on the line [-1, 1] in the last one."""
     (x, w), (z, v) = base, line
     points = np.column_stack([np.tile(x, (len(z), 1)), np.repeat(z[:, 0], len(x))])
@@ -161,11 +161,11 @@ def prism(base: Rule, line: Rule) -> Rule:
 
 
 def pyramid_5() -> Rule:
-    """Return the rule with five points of the pyramid with base [-1, 1]^2 at z = 0 and apex (0, 0, 1), exact to degree 2.
+    """Return the five-point rule on the pyramid, exact to degree 2.
 
-    Four points lie above the midpoints of the half diagonals of the base, and one lies on the axis. All weights are equal.
-    The heights h and k solve 4 h + k = 5/4 and 4 h^2 + k^2 = 1/2, so that 1, z and z^2 are integrated exactly. code_aster
-    has the same rule in PYRAM5.
+    The pyramid has the base [-1, 1]^2 at z = 0 and the apex (0, 0, 1). Four points lie above the midpoints of the half
+    diagonals of the base, and one lies on the axis. All weights are equal. The heights h and k solve 4 h + k = 5/4 and
+    4 h^2 + k^2 = 1/2, so that 1, z and z^2 are integrated exactly. code_aster has the same rule in PYRAM5.
     """
     h, k = (10.0 - np.sqrt(15.0)) / 40.0, 0.25 + np.sqrt(15.0) / 10.0
     points = [[0.5, 0.5, h], [-0.5, 0.5, h], [-0.5, -0.5, h], [0.5, -0.5, h], [0.0, 0.0, k]]
@@ -180,17 +180,17 @@ def conical_pyramid(n: int) -> Rule:
     polynomials in these coordinates.
     """
     x, w = np.polynomial.legendre.leggauss(n)
-    z, v = _gauss_squared_complement(n)
+    z, v = _gauss_jacobi(n)
     A, B, Z = np.meshgrid(x, x, z, indexing="ij")
     points = np.column_stack([(A * (1 - Z)).ravel(), (B * (1 - Z)).ravel(), Z.ravel()])
     return points, np.einsum("i,j,k->ijk", w, w, v).ravel()
 
 
-def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
-    """Return the Gauss rule with `n` points on [0, 1] for the weight (1 - z)^2 (Golub and Welsch, 1969).
+def _gauss_jacobi(n: int) -> tuple[Array, Array]:
+    """Return the Gauss-Jacobi rule with `n` points on [0, 1] for the weight (1 - z)^2 (Golub and Welsch, 1969).
 
-    Its points are the eigenvalues of the recurrence matrix of the Jacobi polynomials with exponents 2 and 0, mapped to
-    [0, 1].
+    Its points are the eigenvalues of the Jacobi matrix, which contains the recurrence coefficients of the Jacobi polynomials
+    with alpha = 2 and beta = 0, mapped to [0, 1].
     """
     k = np.arange(n)
     diagonal = -4.0 / ((2 * k + 2) * (2 * k + 4))
@@ -213,7 +213,7 @@ def product_rule(cell: str, n: int, cartesian: int | None = None) -> Rule:
         "quad4": lambda: gauss_square(m),
         "tet4": lambda: collapsed_tetrahedron(n),
         "hex8": lambda: gauss_cube(m),
-        "wedge6": lambda: prism(collapsed_triangle(n), gauss_line(m)),
+        "wedge6": lambda: tensor_product(collapsed_triangle(n), gauss_line(m)),
         "pyramid5": lambda: conical_pyramid(n),
     }[cell]()
 

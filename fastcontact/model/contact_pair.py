@@ -146,7 +146,7 @@ def check_rotations(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
             change = abs(angle - previous)
             if change > LARGEST_ROTATION:
                 raise ModelError(
-                    f"obstacle '{pair.name}' turns by {change:.3g} radian in the step to {instant:g}, more than "
+                    f"obstacle '{pair.name}' turns by {change:.3g} rad in the step to {instant:g}, more than "
                     f"{LARGEST_ROTATION:g}: with friction use at least {math.ceil(change / LARGEST_ROTATION)} steps instead"
                 )
             previous = angle

@@ -86,7 +86,7 @@ def _supports(model: Any) -> Iterator[str]:
         texts.append(f"{'xyz'[support.component]} = {_value(support.value)}")
         if support.rotation is not None and support.component == model.mesh.dim - 1:
             turn = support.rotation
-            texts.append(f"rotated by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")
+            texts.append(f"rotated by {turn.angle:g} rad about {turn.centre}{_history(support.rotation_ramp)}")
     for (group, ramp), components in by_group.items():
         count = len(model.mesh.points_of(group))
         yield f"Support: {', '.join(components)} on '{group}' ({count} points){_history(ramp)}."

@@ -44,7 +44,7 @@ class PeriodicInterface(NamedTuple):
     relation: MultiPointConstraint | None = None
 
 
-def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
+def representatives(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
     """Return for each node (n_points,) the lowest number of the nodes that coincide with it.
 
     The result is None if there are no interfaces.
@@ -160,7 +160,7 @@ def turned_rows(interface: PeriodicInterface, phase: complex, mesh: Mesh) -> csr
 
 
 def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign: float) -> csr_array | None:
-    """Return rows that tie the nodes of one end to the rotated displacements of the opposite facets of the other end.
+    """Return rows that tie the rotated displacements of the nodes of one end to those of the opposite facets of the other.
 
     Returns None if the rotated nodes do not lie on these facets. Linear fields satisfy the rows exactly.
     """
@@ -178,7 +178,7 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
 
 
 def _motion(rotation: Rotation, sign: float) -> tuple[Array, Array]:
-    """Return the matrix (dim, dim) [-] and the translation (dim,) [length] of the rotation by one sector, or back."""
+    """Return the matrix (dim, dim) [-] and translation (dim,) [length] of a rotation by one sector in direction `sign`."""
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
     return turn, centre - turn @ centre
 

@@ -37,8 +37,8 @@ from fastcontact.results.step import StepResult
 # Age of a file [s] from which each step is synchronised to the disk. A run that is lost earlier can be repeated in less
 # time than this.
 SYNCHRONISED_FROM = 10.0
-# Size in the file of the indices that HDF5 caches in memory [bytes].
-CACHED_INDICES = 1 << 18
+# Size of HDF5's metadata cache, measured in the file [bytes].
+METADATA_CACHE = 1 << 18
 # Suffixes of other formats, in which results cannot be written.
 OTHER_FORMATS = {".vtu", ".vtk", ".pvd", ".med", ".rmed", ".xdmf"}
 
@@ -71,8 +71,8 @@ class ResultWriter:
         Whether to keep the steps of an existing file with the same mesh and to append further steps. If the file does not
         exist or contains no complete step, it is created. An existing file is not changed before a step is added.
     synchronise : bool, optional
-        Whether `write` waits until the step is on the disk, so that the step survives a power loss. By default this is
-        the case from ten seconds after the creation of the file on, so that short runs are not slowed down. Steps survive
+        Whether `write` waits until the step is on the disk, so that the step survives a power loss. By default, `write`
+        waits only if the file was opened more than ten seconds ago, so that short runs are not slowed down. Steps survive
         a crash of the process in any case.
     background : bool
         Whether a step is written while the next one is computed. A step is then complete when the next call of `write`,
@@ -146,7 +146,7 @@ class ResultWriter:
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
         self._notes: dict[str, str] = {}  # the text of the case file, if it differs from that of the resumed run
         self._resumed_state: tuple[int, ...] | None = None
-        with self._as_file_errors("begun"):
+        with self._as_file_errors("opened for writing"):
             self._lock = PathLock(self.path)
             try:
                 if resume:
@@ -196,8 +196,8 @@ class ResultWriter:
         Raises
         ------
         FileError
-            If the file is closed, the step does not follow the previous one, belongs to another case or does not fit
-            the mesh, or if the disk is full or fails.
+            If the file is closed; if the step does not follow the previous one, belongs to another case or does not fit
+            the mesh; or if the disk is full or fails.
         """
         with self._access:
             self.wait()
@@ -307,10 +307,10 @@ class ResultWriter:
             self._committed = CommittedFile(self.path)
             try:
                 self._file = h5py.File(self._committed, "r+")
-                # The cache for index nodes grows with the steps and takes ten times the size in the file.
+                # By default, the metadata cache grows with the steps, to ten times the size of its data in the file.
                 settings = self._file.id.get_mdc_config()
                 settings.set_initial_size = True
-                settings.initial_size = settings.min_size = settings.max_size = CACHED_INDICES
+                settings.initial_size = settings.min_size = settings.max_size = METADATA_CACHE
                 self._file.id.set_mdc_config(settings)
             except BaseException:
                 self._committed.close()
@@ -395,8 +395,8 @@ def _steps_to_resume(
     """
     if not path.exists() or not path.stat().st_size:
         return [], False, ""
-    with contextlib.ExitStack() as closed:
-        old = closed.enter_context(Results(path, repeat=True))
+    with contextlib.ExitStack() as closing:
+        old = closing.enter_context(Results(path, repeat=True))
         if not len(old):
             return [], False, ""
         start_anew = "or start anew without resuming, which replaces the file"
@@ -417,7 +417,7 @@ def _steps_to_resume(
                 f"for the same ones, {start_anew}"
             )
         steps = StoredSteps(old)
-        closed.pop_all()  # the file stays open, because steps are read on access
+        closing.pop_all()  # the file stays open, because steps are read on access
         return steps, old.complete, old.case_text
 
 

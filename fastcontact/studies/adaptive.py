@@ -16,7 +16,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analysis.progress import StatusLine
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.cases.case import Case, build_case, read_case
-from fastcontact.cases.summary import finite
+from fastcontact.cases.summary import finite_or_none
 from fastcontact.errors import CaseError, FastcontactWarning, check_known
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import Forest, circles, linearised, to_quadratic
@@ -139,7 +139,7 @@ class AdaptiveStudy(Report):
     def as_dict(self) -> dict[str, Any]:
         """Return the study as numbers, strings, lists and dictionaries, as ``--json`` writes it; errors are relative [-]."""
         numbers = {name: getattr(self, name) for name in ("combination", "quantity", "tolerance", "reached")}
-        errors = {name: list(map(finite, values)) for name, values in self._errors().items()}
+        errors = {name: list(map(finite_or_none, values)) for name, values in self._errors().items()}
         rounds = [
             {"n_dofs": r.n_dofs, "n_cells": r.n_cells, **r.values, **dict(zip(errors, of_round)), "seconds": r.seconds}
             for r, of_round in zip(self.rounds, zip(*errors.values(), strict=True), strict=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import AnyArray, Array
-from fastcontact.cases.summary import finite
+from fastcontact.cases.summary import finite_or_none
 from fastcontact.results.units import axis_label
 from fastcontact.studies.fit import CONFIDENCE, Limit
 from fastcontact.studies.quantities import RATIOS, column, title
@@ -224,7 +224,7 @@ def series_dict(series: Series) -> dict[str, Any]:
 def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
     """Return the fields of `values` called `names`, by key. NaN, and all fields of None, are replaced by None."""
     fields = {key: getattr(values, name, None) for key, name in names.items()}
-    return {key: finite(value) if isinstance(value, float) else value for key, value in fields.items()}
+    return {key: finite_or_none(value) if isinstance(value, float) else value for key, value in fields.items()}
 
 
 def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
@@ -238,7 +238,7 @@ def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
         **_fields(
             split if series.has_model_error(name) else None, model_error="model", model_error_uncertainty="uncertainty"
         ),
-        "mesh_error": finite(series.mesh_error(name)),
+        "mesh_error": finite_or_none(series.mesh_error(name)),
     }
     if reference is not None:
         entry["reference"] = reference

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import AnyArray
-from fastcontact.cases.summary import finite
+from fastcontact.cases.summary import finite_or_none
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
 
@@ -108,7 +108,7 @@ class RunResult:
     def as_dict(self) -> dict[str, Any]:
         """Return sizes, quantities, duration and warnings for JSON, with None for NaN and without an unknown mesh size."""
         size = {} if math.isnan(self.h) else {"h": self.h}
-        values = {name: finite(value) for name, value in self.values.items()}
+        values = {name: finite_or_none(value) for name, value in self.values.items()}
         return {**size, "n_dofs": self.n_dofs, **values, "seconds": self.seconds, "warnings": list(self.warnings)}
 
 

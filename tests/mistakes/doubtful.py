@@ -103,7 +103,7 @@ DOUBTS = [
         lambda: fc.generate.block((1.0, 1.0), (1, 1)),
         of(STEEL, turned(0.5)),
         (
-            r"the largest rotation is 0\.500 radian, near \[0\.5 0\.5\]: linear kinematics treat it as small, which neglects strains of about 0\.125",
+            r"the largest rotation is 0\.500 rad, near \[0\.5 0\.5\]: linear kinematics treat it as small, which neglects strains of about 0\.125",
         ),
     ),
     Doubt(

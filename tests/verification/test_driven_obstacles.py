@@ -453,7 +453,7 @@ def test_a_rotation_that_makes_no_sense_is_refused(message):
 
 def test_an_axis_without_length_and_too_large_turns_are_refused():
     model = twisted_ball("node_to_segment", angle=4.0)
-    with pytest.raises(fc.ModelError, match=r"turns by 2 radian in the step to 5, .* at least 2 steps"):
+    with pytest.raises(fc.ModelError, match=r"turns by 2 rad in the step to 5, .* at least 2 steps"):
         fc.solve(model, [1.0, 5.0, 9.0])
     with pytest.raises(fc.ModelError, match="has no length"):
         model.add_obstacle(
@@ -488,7 +488,7 @@ friction = 0.3
     told = json.loads((tmp_path / "disc.json").read_text(encoding="utf-8"))["contact"]["disc"]
     assert told["torque"] == pytest.approx(contact.torque)
     assert told["obstacle_angle"] == -0.5
-    assert "obstacle 'disc' has turned by -0.5 radian, with a torque of" in capsys.readouterr().out
+    assert "obstacle 'disc' has turned by -0.5 rad, with a torque of" in capsys.readouterr().out
     path.write_text(text.replace("angle = -0.5", "angel = -0.5"), encoding="utf-8")
     with pytest.raises(fc.CaseError, match=r"did you mean 'obstacle\.disc\.rotation\.angle'"):
         read_case(path)

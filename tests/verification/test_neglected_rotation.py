@@ -28,7 +28,7 @@ def belt(strain):
 def test_a_belt_drawn_far_needs_finite_strains():
     """With small strains the tension is too small, by about the ratio that the warning states (Euler and Eytelwein)."""
     theory = SLACK * np.exp(FRICTION * np.pi / 2)
-    with pytest.warns(fc.FastcontactWarning, match=r"of up to 0\.049 radian matter in body 'BLOCK': .* 2\d% of"):
+    with pytest.warns(fc.FastcontactWarning, match=r"of up to 0\.049 rad matter in body 'BLOCK': .* 2\d% of"):
         linear = belt("small")
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -146,7 +146,7 @@ def test_groups_that_share_nodes_turn_together_or_are_refused() -> None:
 
 
 def test_supports_are_described_with_their_rotation() -> None:
-    assert "rotated by 1.5 radian about (0.3, -1.0)" in bar("plane_strain", "quad8", 1.5).describe()
+    assert "rotated by 1.5 rad about (0.3, -1.0)" in bar("plane_strain", "quad8", 1.5).describe()
 
 
 REFUSED = {

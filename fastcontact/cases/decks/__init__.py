@@ -1,1 +1,1 @@
-"""Conversion of input decks of Abaqus and CalculiX to models with load steps. A note states each keyword without effect."""
+"""Conversion of input decks of Abaqus and CalculiX to models with load steps. Notes list the keywords without effect."""

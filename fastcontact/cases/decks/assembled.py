@@ -72,7 +72,7 @@ class Assembly:
         Members of the sets that have been resolved so far, by kind, instance and name.
     surfaces : dict of str to list of (Element, int)
         Faces of the surfaces that have been resolved so far.
-    open : list of (str, str, str)
+    being_resolved : list of (str, str, str)
         Sets that are being resolved, for the detection of sets that contain themselves.
     """
 
@@ -82,7 +82,7 @@ class Assembly:
     elements: dict[str, dict[int, Element]] = field(default_factory=dict)
     resolved: dict[tuple[str, str, str], list[Any]] = field(default_factory=dict)
     surfaces: dict[str, list[Face]] = field(default_factory=dict)
-    open: list[tuple[str, str, str]] = field(default_factory=list)
+    being_resolved: list[tuple[str, str, str]] = field(default_factory=list)
 
     @cached_property
     def solids(self) -> list[Element]:
@@ -135,11 +135,11 @@ class Assembly:
             listed = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "") or "none"
             raise location.refuse(f"set '{(shown or name)[:LONGEST]}' is not defined; {kind} sets: {listed}")
         if label not in self.resolved:
-            if label in self.open:
+            if label in self.being_resolved:
                 raise location.refuse(f"set '{part.set_names[name]}' contains itself")
-            self.open.append(label)
+            self.being_resolved.append(label)
             members = [member for entry in sets[name] for member in self._members_of_entry(kind, scope, entry)]
-            self.open.pop()
+            self.being_resolved.pop()
             self.resolved[label] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
         return self.resolved[label]
 
@@ -211,14 +211,14 @@ class Assembly:
             if remaining:
                 raise definition.refuse(
                     f"the nodes of surface '{definition.name}' do not form whole faces: {len(remaining)} belong to none "
-                    f"(first: node {self.number_of(remaining[0])}), and *{location.keyword} in line {location.line} "
+                    f"(first: node {self.label_of(remaining[0])}), and *{location.keyword} in line {location.line} "
                     "needs faces, TYPE=ELEMENT"
                 )
             return complete
         if (label := key_of(name)) not in self.surfaces:
             faces: dict[Face, None] = {}
             for face in definition.faces:
-                members = self.elements_of(face.of if not scope else f"{scope}.{face.of}", face.location)
+                members = self.elements_of(face.name if not scope else f"{scope}.{face.name}", face.location)
                 faces.update(dict.fromkeys(entry for element in members for entry in self._faces_of(element, face)))
             self.surfaces[label] = list(faces)
         return self.surfaces[label]
@@ -306,10 +306,10 @@ class Assembly:
 
     def surface_nodes(self, definition: Surface, scope: str) -> list[int]:
         """Return the points of a node-based surface without repetition."""
-        entries = [(face.of if not scope else f"{scope}.{face.of}", face.location) for face in definition.faces]
+        entries = [(face.name if not scope else f"{scope}.{face.name}", face.location) for face in definition.faces]
         return list(dict.fromkeys(point for name, location in entries for point in self.nodes(name, location)))
 
-    def number_of(self, point: int) -> str:
+    def label_of(self, point: int) -> str:
         """Return the label in the deck of the node at a point, with its instance."""
         for scope, nodes in self.index.items():
             for number, index in nodes.items():

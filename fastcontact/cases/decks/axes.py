@@ -44,7 +44,7 @@ def distribution_table(content: Content, part: Part, block: Block) -> None:
 
 
 def distribution(content: Content, part: Part, block: Block) -> None:
-    """Read *DISTRIBUTION: two points that define the axes of each element, or of all others on a line without element."""
+    """Read *DISTRIBUTION: two points that define the axes of an element or, on a line without element, the default axes."""
     block.choice("LOCATION", ("ELEMENT",))
     register("distribution", block.required("NAME"), content.distributions, block, block)
 
@@ -80,7 +80,7 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
 
 
 def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> Array:
-    """Return the material axes (n, 3, 3) [-] of all solids: those of `members` from a *DISTRIBUTION, others the global axes.
+    """Return the material axes (n, 3, 3) [-] of all solids: for `members` those of a *DISTRIBUTION, else the global axes.
 
     Raises CaseError if a member has no axes and there is no default.
     """

@@ -184,12 +184,12 @@ class Block(Item):
 
 @dataclass
 class Source:
-    """State of the reader: folder of the deck, size [byte] and paths of the files read so far, and files that are open."""
+    """State of the reader: folder of the deck, size [byte] and paths of the files read so far, and open files."""
 
     folder: Path
     size: int = 0
     files: list[Path] = field(default_factory=list)
-    open: list[Path] = field(default_factory=list)
+    open_files: list[Path] = field(default_factory=list)
 
 
 def as_number(location: Location, text: str) -> float:
@@ -255,7 +255,7 @@ def _contents(path: Path, source: Source) -> bytes:
 
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
     """Yield the blocks of a file and of its included files. Raises CaseError if data precede the first keyword."""
-    source.open.append(path.resolve())
+    source.open_files.append(path.resolve())
     first, *others = _KEYWORD_LINE.split(_contents(path, source))
     start = Location(name, 1, "")
     _check_lengths(start, first)
@@ -269,11 +269,11 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
         else:
             yield block
         number += contents.count(b"\n")
-    source.open.pop()
+    source.open_files.pop()
 
 
 def _check_lengths(location: Location, contents: bytes) -> None:
-    """Raise CaseError if one of the lines from a location on is too long."""
+    """Raise CaseError if a line of `contents`, which begin at a location, is too long."""
     if match := _LONG_LINE.search(contents):
         raise replace(location, line=location.line + contents.count(b"\n", 0, match.start())).refuse(_TOO_LONG)
 
@@ -363,8 +363,8 @@ def _read_include(block: Block, name: str, source: Source) -> Iterator[Block]:
         )
     if not exists:
         raise block.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
-    if target in source.open:
-        target_name = "the deck" if target == source.open[0] else f"'{shown}'"
+    if target in source.open_files:
+        target_name = "the deck" if target == source.open_files[0] else f"'{shown}'"
         raise block.refuse(f"{target_name} includes itself")
     yield from _blocks(target, file_name, source)
 

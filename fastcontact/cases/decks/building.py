@@ -15,7 +15,7 @@ from fastcontact.cases.decks.assembled import Element
 from fastcontact.cases.decks.axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.blocks import key_of, look_up, refusing
 from fastcontact.cases.decks.conditions import Component, Conditions
-from fastcontact.cases.decks.constraints import make_rotations, relations_of
+from fastcontact.cases.decks.constraints import add_rotation_points, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
 from fastcontact.cases.decks.gaps import TOUCHING, add_gap_facets, add_gaps, check_discrete
@@ -57,7 +57,7 @@ class Building:
     local_supports : list of MultiPointConstraint
         Supports that are expressed as constraints, because they act along local axes or not in all steps. They are the first
         constraints of the model.
-    linearised : str
+    small_strain_cause : str
         Reason why small strains are assumed although a step has NLGEOM; otherwise empty.
     driven : dict of (int, int) to Table
         Prescribed motions [length] of nodes of gap elements that belong to no solid, by point and component.
@@ -70,18 +70,18 @@ class Building:
         self.assembly = deck_mesh_of(content)
         only_heat = content.heat == "uncoupled"
         if not only_heat:
-            make_rotations(self.assembly)
+            add_rotation_points(self.assembly)
         materials, self.thickness = self._materials()
         self.sections = sections_by_point(self.assembly)
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
-        conditions.run()
+        conditions.record()
         loads = distributed_loads(self.assembly, conditions.loads) + distributed_loads(self.assembly, conditions.fluxes)
         loads += heat_loads(self.assembly, conditions, self.thickness)
         if not only_heat:
             add_gap_facets(self.assembly)
         mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
-        strain, self.linearised = strain_of(content, [law for law, _ in materials])
+        strain, self.small_strain_cause = strain_of(content, [law for law, _ in materials])
         options: dict[str, Any] = {"strain": strain, "reference_temperature": conditions.reference}
         self.model = Model(mesh, self.assembly.kinematics, case_text, **options)
         for material, group in materials:
@@ -147,12 +147,12 @@ class Building:
             key = (key_of(section.material), key_of(section.orientation), element.solid.incompatible_modes)
             by_material.setdefault(key, []).append(element)
         materials = []
-        for (name, orientation, modes), members in by_material.items():
+        for (name, orientation, incompatible_modes), members in by_material.items():
             material = self.content.materials[name]
             axes = self._axes(members[0].assigned_section, members)
             group = f"material {material.name}" + (f" along {orientation.lower()}" if orientation else "")
-            group += " with incompatible modes" if modes else ""
-            law = law_of(self.content, material, axes, modes)
+            group += " with incompatible modes" if incompatible_modes else ""
+            law = law_of(self.content, material, axes, incompatible_modes)
             materials.append((law, self.assembly.add_solids(group, members)))
         return materials, thickness or 1.0
 

@@ -39,7 +39,7 @@ class Conditions:
         Temperatures of *TEMPERATURE, and those that *BOUNDARY prescribes where temperatures are computed.
     powers, fluxes, films : Histories
         Nodal heat flows, heat fluxes and volumetric sources, and ambient temperatures of films.
-    of_keyword : dict of str to Histories
+    by_keyword : dict of str to Histories
         Histories of loads and temperatures by keyword.
     histories : tuple of Histories
         All histories.
@@ -60,7 +60,7 @@ class Conditions:
         self.fluxes: Histories[Target] = Histories(content)
         self.films: Histories[Target] = Histories(content, default=self.reference)
         self.film_of: dict[tuple[str, Face | None], Target] = {}
-        self.of_keyword: dict[str, Histories[Any]] = {
+        self.by_keyword: dict[str, Histories[Any]] = {
             "CLOAD": self.forces, "TEMPERATURE": self.given_temperatures, "CFLUX": self.powers,
             **dict.fromkeys(("DLOAD", "DSLOAD"), self.loads), **dict.fromkeys(("DFLUX", "DSFLUX"), self.fluxes),
             **dict.fromkeys(("FILM", "SFILM"), self.films),
@@ -68,17 +68,17 @@ class Conditions:
         self.histories: tuple[Histories[Any], ...] = (
             self.supports,
             self.fixed_temperatures,
-            *dict.fromkeys(self.of_keyword.values()),
+            *dict.fromkeys(self.by_keyword.values()),
         )
         self.directions = local_directions(assembly)
         if assembly.dim == 3:  # rotations refer to the local axes of their node
             rotations, rotated = assembly.rotations, self.directions
             self.directions = {rotations[p]: axes for p, axes in rotated.items() if p in rotations} | rotated
 
-    def run(self) -> None:
+    def record(self) -> None:
         """Record the supports and loads of all steps."""
         for block in self.assembly.content.supports:
-            self._supports(block, before=True)
+            self._supports(block, precedes_steps=True)
         for history in (self.supports, self.fixed_temperatures):
             history.initial, history.step_values = history.step_values, {}
         for number, step in enumerate(self.assembly.content.steps, start=1):
@@ -86,7 +86,7 @@ class Conditions:
                 if block.keyword == "BOUNDARY":
                     self._supports(block)
                 else:
-                    self.of_keyword[block.keyword].record(block, map(self._load, block.iter_rows()))
+                    self.by_keyword[block.keyword].record(block, map(self._load, block.iter_rows()))
             for history in self.histories:
                 history.advance(number, step)
 
@@ -121,7 +121,7 @@ class Conditions:
         points = self.assembly.nodes(row.text(0), row.location)
         for point in points:
             if point not in self.assembly.solid_points:
-                raise row.refuse(f"node {self.assembly.number_of(point)} belongs to no solid, so it has no temperature")
+                raise row.refuse(f"node {self.assembly.label_of(point)} belongs to no solid, so it has no temperature")
         return points
 
     def _films(self, row: Row) -> list[Target]:
@@ -149,10 +149,10 @@ class Conditions:
         point, axis, _ = component
         if point >= sum(map(len, self.assembly.index.values())):
             return f"rotation {axis + 1} of a reference node"
-        return f"component {axis + 1} of node {self.assembly.number_of(point)}"
+        return f"component {axis + 1} of node {self.assembly.label_of(point)}"
 
-    def _supports(self, block: Block, before: bool = False) -> None:
-        """Record a block *BOUNDARY of the current step or, if `before` is true, a block that precedes all steps."""
+    def _supports(self, block: Block, precedes_steps: bool = False) -> None:
+        """Record a block *BOUNDARY of the current step or, if `precedes_steps` is true, one that precedes all steps."""
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
             raise block.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
@@ -174,7 +174,7 @@ class Conditions:
                 if not 1 <= first <= last <= 6:
                     raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
                 components = tuple(range(first, last + 1))
-            driven = driven or bool(before and value)
+            driven = driven or bool(precedes_steps and value)
             prescribed = Value(value, block.get("AMPLITUDE"), row.location)
             for point in points:
                 for component in components:

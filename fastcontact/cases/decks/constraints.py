@@ -22,12 +22,12 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
 
 # Smallest number of nodes of those kinds of *MPC whose number of nodes is not fixed.
-LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
+MIN_NODES = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
 # Tolerance of the tests for collinear points, and for points on the axis relative to squared distances.
 FLAT = 1e-9
 
 
-def make_rotations(deck_mesh: DeckMesh) -> None:
+def add_rotation_points(deck_mesh: DeckMesh) -> None:
     """Add a point for the rotation of each reference node, before the mesh is built.
 
     Raises CaseError in axisymmetric models.
@@ -43,7 +43,7 @@ def make_rotations(deck_mesh: DeckMesh) -> None:
 
 
 def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
-    """Return the constraints of all equations and *MPC together, and those of each rigid body and coupling."""
+    """Return one constraint for all equations and *MPC, and one for each rigid body and each coupling."""
     content = deck_mesh.content
     axes = local_directions(deck_mesh)
     rows = [_equation(deck_mesh, equation, axes) for equation in content.equations]
@@ -138,18 +138,18 @@ def _directions(deck_mesh: DeckMesh, coupling: Coupling, point: int) -> Array:
 
 
 def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
-    """Return the equations of a multi-point constraint. Raises CaseError if it does not suit its nodes or a plane model."""
+    """Return the equations of a multi-point constraint. Raises CaseError if its nodes or a plane model do not admit it."""
     if constraint.kind in ("PIN", "TIE"):
         return _pin_rows(deck_mesh, constraint)
     nodes = [point for name in constraint.nodes for point in deck_mesh.nodes(name, constraint.location)]
     nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
     nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
-    if len(nodes) < LEAST[constraint.kind] or deck_mesh.dim == 2:
-        raise constraint.refuse(f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in 3D")
+    if len(nodes) < MIN_NODES[constraint.kind] or deck_mesh.dim == 2:
+        raise constraint.refuse(f"{constraint.kind} needs {MIN_NODES[constraint.kind]} different nodes or more, in 3D")
     coordinates = deck_mesh.points[nodes]
     if constraint.kind == "MEANROT":
         return [_mean_rotation(constraint, nodes, coordinates)]
-    relative, k = coordinates - coordinates[0], LEAST[constraint.kind] - 1
+    relative, k = coordinates - coordinates[0], MIN_NODES[constraint.kind] - 1
     basis = relative[1:k]  # from the first node to the others of the k nodes that determine the line or the plane
     _, sizes, directions = np.linalg.svd(basis)
     if sizes[-1] <= FLAT * sizes[0]:
@@ -282,10 +282,10 @@ def multi_point(content: Content, block: Block) -> None:
         kind, nodes = row.text(0).upper(), [unquoted(entry) for entry in row.entries[1:] if entry]
         if kind.isdecimal() and started:
             started[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
-        elif kind in LEAST:
+        elif kind in MIN_NODES:
             started.append((row, kind, nodes))
         elif kind not in ("PIN", "TIE", "BEAM"):
-            kinds = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
+            kinds = ", ".join(("PIN", "TIE", "BEAM", *MIN_NODES))
             raise row.refuse(f"an MPC of type {kind[:40]} is not supported, only {kinds}")
         elif len(nodes) != 2:
             raise row.refuse(f"{kind} needs two nodes, the dependent and the independent one")

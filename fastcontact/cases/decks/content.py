@@ -12,18 +12,18 @@ from fastcontact.cases.decks.blocks import Block, Item, Located, Location, key_o
 
 @dataclass(frozen=True, slots=True)
 class Cell(Located):
-    """An element: its type, node numbers, the location `within` which it is defined (*ELEMENT), its line, and its ELSET."""
+    """An element: its type, its node numbers, the location of its *ELEMENT (`block_location`), its line, and its ELSET."""
 
     type: str
     nodes: Sequence[int]
-    within: Location
+    block_location: Location
     line: int
     set: str = ""
 
     @property
     def location(self) -> Location:  # type: ignore[override]
         """Location of the element in the deck."""
-        return replace(self.within, line=self.line)
+        return replace(self.block_location, line=self.line)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ class Members(Item):
 
 @dataclass(frozen=True, slots=True)
 class SurfaceEntry(Item):
-    """An entry of a surface: `of` is an element set or number, with the label of a face, or a node set or number."""
+    """An entry of a surface: the `name` of an element set or number, with the label of a face, or of a node set or number."""
 
-    of: str
+    name: str
     label: str = ""
 
 
@@ -105,7 +105,7 @@ class Instance:
 
 @dataclass
 class Material(Located):
-    """A material of the deck; `law` returns the material of the model for given material axes (None: those of the mesh)."""
+    """A material of the deck; `law` returns the material of the model for given material axes (None: the global axes)."""
 
     name: str
     location: Location
@@ -220,7 +220,7 @@ class Axes(Item):
     """Local axes of nodes or materials.
 
     Rectangular axes are given by a point on the first axis and a point in the plane of the first two axes, cylindrical axes
-    by two points of the axis of the cylinder.
+    by two points on the axis of the cylinder.
     """
 
     name: str  # of an *ORIENTATION, or of the node set of a *TRANSFORM
@@ -250,9 +250,7 @@ class Step(Located):
     increment: float = 1.0
     has_procedure: bool = False
     perturbation: bool = False
-    heat: str = (
-        ""  # conduction "uncoupled" from or "coupled" with displacements; empty if temperatures are not computed
-    )
+    heat: str = ""  # "coupled" or "uncoupled" heat conduction; empty if temperatures are not computed
     n_modes: int = 0
     conditions: list[Block] = field(default_factory=list)  # blocks of supports, loads and temperatures
 

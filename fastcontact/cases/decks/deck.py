@@ -29,7 +29,7 @@ from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult, Steps
 
 # Attributes of `ContactResult` that are proportional to the thickness of a plane model.
-FORCES = ("force", "force_vectors", "dissipation", "primary_force_vectors")
+EXTENSIVE_FIELDS = ("force", "force_vectors", "dissipation", "primary_force_vectors")
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +166,7 @@ class Deck:
         if t == 1.0:
             return replace(step, reaction=reaction)
         contacts = {
-            name: replace(contact, **{key: t * getattr(contact, key) for key in FORCES})
+            name: replace(contact, **{key: t * getattr(contact, key) for key in EXTENSIVE_FIELDS})
             for name, contact in step.contact.items()
         }
         sums = {name: _scaled(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
@@ -193,7 +193,7 @@ class Deck:
 
     def _warn_of_large_strains(self, step: StepResult) -> None:
         """Warn, with the largest equivalent strain and rotation, if the deck has NLGEOM but small strains were assumed."""
-        if not self.building.linearised:
+        if not self.building.small_strain_cause:
             return
         field, largest = self.model.material_field(), 0.0
         for name, cells in self.model.mesh.solids.items():
@@ -203,7 +203,7 @@ class Deck:
         angle, _ = largest_rotation(self.model.mesh, step.displacement)
         warn(
             f"{nonlinear.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
-            f"{largest:.3g} and the rotation up to {angle:.3g} radian, whose squares linear kinematics neglect"
+            f"{largest:.3g} and the rotation up to {angle:.3g} rad, whose squares linear kinematics neglect"
         )
 
 
@@ -211,7 +211,7 @@ class Deck:
 def read_deck(path: PathLike) -> Deck:
     """Read an input deck of Abaqus or CalculiX.
 
-    Supported are static and steady heat transfer steps of elastic, elastic-plastic and hyperelastic bodies in contact, and a
+    Static and steady heat transfer steps of elastic, elastic-plastic and hyperelastic bodies in contact are supported, and a
     final step with natural frequencies. Each keyword and parameter is translated, listed in a note because it has no effect,
     or rejected with an error. Included files must be in the folder of the deck or below.
 
@@ -253,11 +253,11 @@ def read_deck(path: PathLike) -> Deck:
         building = Building(content, f"# from the deck {file.name}\n")
     except (ModelError, MeshError, ContactError) as error:
         raise type(error)(f"{file.name}: {error}") from error
-    if building.linearised:
+    if building.small_strain_cause:
         step = next(step for step in content.steps if step.nonlinear)
         warn(
-            f"{step.location}: NLGEOM: with {building.linearised} small strains and rotations are assumed; the result is "
-            "valid only while they stay small, and a warning after the solution reports how large they are"
+            f"{step.location}: NLGEOM: with {building.small_strain_cause} small strains and rotations are assumed; the "
+            "result is valid only while they stay small, and a warning after the solution reports how large they are"
         )
     return Deck(
         path=file,

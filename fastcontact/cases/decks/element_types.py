@@ -59,7 +59,7 @@ class ElementType:
 
 @cache
 def element_type(name: str) -> ElementType | None:
-    """Return the translation of an element type in upper case; None if it is no supported solid or heat transfer element."""
+    """Return the translation of an element type in upper case; None if it is not a supported solid or conducting element."""
     conducts = name[:4] in CONDUCTING
     base = CONDUCTING[name[:4]] + name[4:] if conducts else name.removesuffix("T")
     note, modes = "", False

@@ -74,7 +74,7 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
 
 
 # Keywords of heat loads.
-OF_HEAT = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
+HEAT_LOADS = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
 
 
 def check_steps(content: Content) -> None:
@@ -88,7 +88,7 @@ def check_steps(content: Content) -> None:
                 "precede them: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
             )
         for block in step.conditions:
-            if block.keyword in OF_HEAT and not step.heat:
+            if block.keyword in HEAT_LOADS and not step.heat:
                 raise block.refuse("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:
                 raise block.refuse(

@@ -42,19 +42,19 @@ def spring(content: Content, block: Block) -> None:
 
 def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Gap | Spring], keyword: str) -> None:
     """Raise CaseError if `keyword` gives properties to elements not of type `kind`, or not to all elements of this type."""
-    complete = set()
+    with_properties = set()
     for name, entry in properties.items():
         for element in assembly.elements_of(name, entry.location):
             if element.cell.type != kind:
                 raise entry.refuse(f"element {element.number} is not of type {kind}")
-            complete.add(element)
+            with_properties.add(element)
     for element in assembly.discrete:
-        if element.cell.type == kind and element not in complete:
+        if element.cell.type == kind and element not in with_properties:
             raise element.cell.refuse(f"element {element.number} of type {kind} has no {keyword}")
 
 
 def add_gap_facets(deck_mesh: DeckMesh) -> None:
-    """Create groups of the facets with the nodes of gap elements; those with the second nodes only if these are in solids.
+    """Create groups of the facets with the first nodes of gap elements, and with the second nodes if these belong to solids.
 
     Raises CaseError if the nodes do not fill whole facets.
     """

@@ -53,13 +53,13 @@ class Track:
     """The common history of quantities that have had equal values in all steps so far.
 
     `numbers` alternates between load factors and values, since each node may have a separate track and a list of pairs would
-    take three times the memory. `periods` are those in which the quantities act. `shape` is the current value with its
-    amplitude, if that is in total time.
+    take three times the memory. `periods` are those in which the quantities act. `value_in_total_time` is the current value
+    with its amplitude, if that is in total time.
     """
 
     numbers: array[float]
     periods: tuple[Period, ...] = ()
-    shape: tuple[float, Amplitude] | None = None
+    value_in_total_time: tuple[float, Amplitude] | None = None
 
     @property
     def alive(self) -> bool:
@@ -97,7 +97,7 @@ class Value(NamedTuple):
 
 @dataclass(eq=False)
 class Histories(Generic[Name]):
-    """Histories of loads or supports by name.
+    """Histories of loads or supports by name, which is a `Component`, a `Target` or a point.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class Histories(Generic[Name]):
                 self.set_value(name, shared)
 
     def keep(self, name: Name, value: Value) -> None:
-        """Keep the value at the end of the last step in the current step or, if none acts then, set the given value."""
+        """Keep the value that acts at the end of the last step; if there is none, set the given value."""
         if name in self.tracks and self.tracks[name].alive:
             self.step_values[name] = Value(self.tracks[name].last, "", value.location)
             self.removals.pop(name, None)
@@ -170,29 +170,29 @@ class Histories(Generic[Name]):
 
     def advance(self, number: int, step: Step) -> None:
         """Advance to the end of step `number`, counted from 1."""
-        begin, start = float(number - 1), self.time
+        start_factor, start_time = float(number - 1), self.time
         self.time += step.period
         current = self.initial | self.step_values if self.initial else self.step_values
         changed: dict[tuple[Any, ...], Track] = {}
         for name in (*current, *self.removals):
             previous, baseline, new = self.tracks.get(name), self.baseline.get(name, self.default), current.get(name)
             value, amplitude = new[:2] if new else (baseline, "")
-            periods = self._periods(name, new, begin)
+            periods = self._periods(name, new, start_factor)
             key = previous, value, amplitude, baseline, periods
             if key not in changed:
                 numbers = array("d", (0.0, baseline)) if previous is None else previous.numbers[:]
                 track = changed[key] = Track(numbers, periods)
-                track.add([(begin, track.last)])
+                track.add([(start_factor, track.last)])
                 if amplitude:
-                    shape = self.content.amplitudes[key_of(amplitude)]
-                    track.add(_amplitude_points(value, shape, begin, start, step.period))
-                    track.shape = (value, shape) if shape.total else None
+                    history = self.content.amplitudes[key_of(amplitude)]
+                    track.add(_amplitude_points(value, history, start_factor, start_time, step.period))
+                    track.value_in_total_time = (value, history) if history.total else None
                 else:
-                    track.add([(begin + 1, value)])
+                    track.add([(start_factor + 1, value)])
             self.tracks[name] = changed[key]
-        in_total_time = {track: track.shape for track in self.tracks.values() if track.shape is not None}
-        for track in in_total_time.keys() - changed.values():
-            track.add(_amplitude_points(*in_total_time[track], begin, start, step.period))
+        continued = {track: pair for track in self.tracks.values() if (pair := track.value_in_total_time) is not None}
+        for track in continued.keys() - changed.values():
+            track.add(_amplitude_points(*continued[track], start_factor, start_time, step.period))
         self.step_values, self.initial, self.removals, self.kept = {}, {}, {}, set()
 
     def _periods(self, name: Name, new: Value | None, begin: float) -> tuple[Period, ...]:
@@ -236,36 +236,36 @@ class Histories(Generic[Name]):
 class ByShape(Generic[Name]):
     """Histories of nodes, facets or cells, grouped by a key, such as an axis, and by shape, so that few loads are needed.
 
-    Iteration yields the axis, the points, the value and the history of each group. The value is 1 if all points have the same
+    Iteration yields the key, the points, the value and the history of each group. The value is 1 if all points have the same
     history; otherwise it is a function that returns one value for each point, with the points in ascending order.
     """
 
     def __init__(self) -> None:
         self._members: dict[tuple[Name, Table], tuple[Table, array[float], array[int]]] = {}
 
-    def add(self, axis: Name, table: Table, points: Sequence[int]) -> None:
-        """Add the history of some points along an axis."""
+    def add(self, key: Name, table: Table, points: Sequence[int]) -> None:
+        """Add the history of some points under a key."""
         peak = max((value for _, value in table), key=abs)
         shape = tuple((factor, round(value / peak, DECIMALS)) for factor, value in table) if peak else table
-        _, peaks, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
+        _, peaks, members = self._members.setdefault((key, shape), (table, array("d"), array("q")))
         peaks.extend([peak] * len(points))
         members.extend(points)
 
     @staticmethod
     def of(histories: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
-        """Return the histories of scalar quantities, whose axis is 0."""
+        """Return the histories of scalar quantities, whose key is 0."""
         by_shape = ByShape[int]()
         for table, points in histories:
             by_shape.add(0, table, points)
         return by_shape
 
     def __iter__(self) -> Iterator[tuple[Name, Indices, Any, Table]]:
-        for (axis, shape), (table, peaks, members) in self._members.items():
+        for (key, shape), (table, peaks, members) in self._members.items():
             points, inverse = np.unique(members, return_inverse=True)
             if len(points) == len(members) and min(peaks) == max(peaks):
-                yield axis, np.asarray(members), 1.0, table
+                yield key, np.asarray(members), 1.0, table
             else:  # several values at a point are added
-                yield axis, points, partial(repeated_values, np.bincount(inverse, peaks).astype(float)), shape
+                yield key, points, partial(repeated_values, np.bincount(inverse, peaks).astype(float)), shape
 
 
 def repeated_values(values: Array, positions: Array) -> Array:
@@ -274,16 +274,16 @@ def repeated_values(values: Array, positions: Array) -> Array:
 
 
 def _amplitude_points(
-    value: float, shape: Amplitude, begin: float, start: float, period: float
+    value: float, amplitude: Amplitude, start_factor: float, start_time: float, period: float
 ) -> list[tuple[float, float]]:
     """Return pairs of load factor and `value` times amplitude for a step.
 
-    The step begins at the load factor `begin` and the total time `start`, and has the duration `period`.
+    The step begins at the load factor `start_factor` and the total time `start_time`, and has the duration `period`.
     """
-    first = start if shape.total else 0.0
-    low, high = bisect_right(shape.times, first), bisect_left(shape.times, first + period)
-    times = [first, *shape.times[low:high], first + period]
+    first = start_time if amplitude.total else 0.0
+    low, high = bisect_right(amplitude.times, first), bisect_left(amplitude.times, first + period)
+    times = [first, *amplitude.times[low:high], first + period]
     neighbours = slice(max(low - 1, 0), high + 1)
-    values = np.interp(times, shape.times[neighbours], shape.values[neighbours])
+    values = np.interp(times, amplitude.times[neighbours], amplitude.values[neighbours])
     fractions = [(t - first) / period for t in times[:-1]] + [1.0]
-    return [(begin + t, value * float(v)) for t, v in zip(fractions, values, strict=True)]
+    return [(start_factor + t, value * float(v)) for t, v in zip(fractions, values, strict=True)]

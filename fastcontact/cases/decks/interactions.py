@@ -168,7 +168,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
         content.note(behaviour, f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which it fails")
     else:
         constants["stiffness"] = stiffness
-    content.note(behaviour, "sides that are pressed together have the stiffness of the layer, also where it is broken")
+    content.note(behaviour, "sides that are pressed together have the stiffness of the layer, even where it is broken")
     return {"cohesion": constants}
 
 
@@ -250,9 +250,9 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def _friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the option `friction_heat`: the fraction of the work that becomes heat, over the duration of a step.
+    """Return the option `friction_heat`: the fraction of the frictional work that becomes heat, divided by the step duration.
 
-    The division converts work per unit of the load factor, by which a step advances 1, to power.
+    In each step the load factor increases by 1, so that this division converts work to power.
     """
     if law.friction_heat is None:
         if law.conductance:

@@ -202,7 +202,7 @@ def keyword_properties(block: Block, about: str) -> Keyword:
     entry = TRANSLATED.get(keyword)
     if entry is None:
         similar = difflib.get_close_matches(keyword, [*TRANSLATED, *OUTPUT, *REFUSED, "INCLUDE"], n=1, cutoff=0.6)
-        suggestion = f"; is *{similar[0]} meant?" if similar else ""
+        suggestion = f": did you mean *{similar[0]}?" if similar else ""
         raise block.refuse(f"unknown keyword *{keyword}{suggestion}")
     for name in block.parameters:
         if entry.used != ANYTHING and name not in entry.parameters:

@@ -192,7 +192,7 @@ def _relative(table: Table, reference: float) -> Table:
 
 
 def _span(period: Period, begin: float) -> tuple[float, float]:
-    """Return the load factors of a period; the first is minus infinity if temperatures are computed only from it on."""
+    """Return the load factors of a period, with minus infinity for a start at or before `begin`, when conduction starts."""
     return period.begins if period.begins > begin else -np.inf, period.ends
 
 

@@ -177,16 +177,16 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
     return values[0] if kind == "ISO" else values
 
 
-def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
-    """Return the model's material with the given `axes`; `modes` is true if its elements have incompatible modes."""
+def law_of(content: Content, material: Material, axes: Any, incompatible_modes: bool) -> Any:
+    """Return the model's material with the given `axes`; `incompatible_modes` states whether its elements have them."""
     if content.heat == "uncoupled":
         return _add_constants(material, ARBITRARY_LAW, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
     law = replace(law, density=material.density)
-    if isinstance(law, nonlinear.NonlinearElastic) and modes:
+    if isinstance(law, nonlinear.NonlinearElastic) and incompatible_modes:
         content.note(material, f"{material.about}incompatible modes are left out, since it is nonlinear")
-    elif modes:
+    elif incompatible_modes:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
         law = _add_constants(material, law, axes, conductivity=_conductivity(content, material))

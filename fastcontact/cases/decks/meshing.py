@@ -30,7 +30,7 @@ class DeckMesh(Assembly):
         component is the rotation.
     facets : dict of str to list of tuple of int
         Points of the distinct facets by facet type.
-    rows : dict of tuple of int to int
+    row_of_facet : dict of tuple of int to int
         Row of a facet in the list of its type, by its sorted points.
     groups : dict of str to dict of str to list of int
         Groups of cells, as rows by element type.
@@ -42,7 +42,7 @@ class DeckMesh(Assembly):
 
     rotations: dict[int, int] = field(default_factory=dict)
     facets: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)
-    rows: dict[tuple[int, ...], int] = field(default_factory=dict)
+    row_of_facet: dict[tuple[int, ...], int] = field(default_factory=dict)
     groups: dict[str, dict[str, list[int]]] = field(default_factory=dict)
     point_groups: dict[str, Indices] = field(default_factory=dict)
     excluded: dict[str, list[int]] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class DeckMesh(Assembly):
             points = facet_points(element, facet)
             name = elements.get(element.solid.element).facet_elements[facet]
             facets = self.facets.setdefault(name, [])
-            row = self.rows.setdefault(tuple(sorted(points)), len(facets))
+            row = self.row_of_facet.setdefault(tuple(sorted(points)), len(facets))
             if row == len(facets):
                 facets.append(points)
             rows.setdefault(name, []).append(row)
@@ -144,7 +144,7 @@ def deck_mesh_of(content: Content) -> DeckMesh:
             )
         if element.solid.conducts and content.heat != "uncoupled":
             raise element.cell.refuse(
-                f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
+                f"elements of type {element.solid.name} conduct heat alone: they need *HEAT TRANSFER in all steps"
             )
     points = deck_mesh.points
     if deck_mesh.dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
@@ -192,7 +192,7 @@ def check_nodes(deck_mesh: DeckMesh, name: str, location: Location) -> None:
     for point in deck_mesh.surface_nodes(definition, scope) if definition.of_nodes else ():
         if point not in deck_mesh.outer_faces:
             raise definition.refuse(
-                f"node {deck_mesh.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
+                f"node {deck_mesh.label_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
             )
 

@@ -19,7 +19,7 @@ from fastcontact.model.model import Model
 
 
 def pretension_section(content: Content, block: Block) -> None:
-    """Read *PRE-TENSION SECTION: a surface across a bolt, and the node of the shortening and the force of the bolt."""
+    """Read *PRE-TENSION SECTION: a surface across a bolt, and the node with the shortening and the force of the bolt."""
     if len(block.rows) > 1:
         raise block.refuse(f"{len(block.rows)} data lines, but at most one is allowed, the normal")
     row = block.rows[0] if block.rows else None
@@ -64,7 +64,7 @@ def _locked_from(point: int, section: PretensionSection, conditions: Conditions)
 def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
     """Return the mesh cut along all pretension sections.
 
-    Raises CaseError for an impossible cut or two sections of a surface.
+    Raises CaseError if a cut is impossible, or if a surface has two sections.
     """
     sections: set[str] = set()
     for section in deck_mesh.content.pretension_sections:

@@ -243,15 +243,15 @@ class PressureFieldFormulation(Formulation):
         return dependent | (held & ~on_held_facets)
 
     def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
-        """Return a pressure field in which the nodes of `PairOptions.same_place` have a common value.
+        """Return a pressure field in which the nodes of `PairOptions.representatives` have a common value.
 
         Both `field` and the result consist of the map (n_nodes, k) from independent to nodal values, and the nodes (k,) of
         the independent values.
         """
-        (values, nodes), same = field, self.options.same_place
-        if same is None:
+        (values, nodes), representatives = field, self.options.representatives
+        if representatives is None:
             return field
-        first, column = np.unique(same[self.secondary.points[nodes]], return_inverse=True)
+        first, column = np.unique(representatives[self.secondary.points[nodes]], return_inverse=True)
         independent = np.empty(len(first), np.intp)
         independent[column] = nodes
         return csr_array(values @ csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), column)))), independent

@@ -11,7 +11,7 @@ import numpy as np
 from fastcontact.mesh.elements._element import Array, Element, product, quadratic, with_middles
 from fastcontact.mesh.elements.lines import LINE2, LINE3
 from fastcontact.mesh.elements.triangles import TRI3, TRI6
-from fastcontact.mesh.quadrature import gauss_line, prism, triangle_3_sides, triangle_7
+from fastcontact.mesh.quadrature import gauss_line, tensor_product, triangle_3_sides, triangle_7
 
 NODES, shape, gradient = product(np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)]), TRI3, LINE2)
 Z = NODES[:, 2]
@@ -20,7 +20,7 @@ TWICE = np.tile(np.arange(3), 2)  # number of the triangle corner below or above
 WEDGE6 = Element(
     "wedge6", NODES, edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
     facets=((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), shape=shape, gradient=gradient,
-    quadrature=prism(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, quadratic="wedge15",
+    quadrature=tensor_product(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, quadratic="wedge15",
     dilatation=0,
 )  # fmt: skip
 # Ends of the edges of the two triangles, and the coordinate z = -1 or 1 of each edge.
@@ -49,7 +49,7 @@ def gradient_15(xi: Array) -> Array:
 
 
 WEDGE15 = quadratic(
-    "wedge15", WEDGE6, (with_middles(WEDGE6), shape_15, gradient_15), quadrature=prism(triangle_7(), gauss_line(3)),
+    "wedge15", WEDGE6, (with_middles(WEDGE6), shape_15, gradient_15), quadrature=tensor_product(triangle_7(), gauss_line(3)),
     meshio="wedge15", med="P15", vtk=26, dilatation=0,
 )  # fmt: skip
 CENTRES = np.column_stack([TRI6.nodes[3:], np.zeros(3)])

@@ -159,7 +159,7 @@ class ModelBase(Suggesting):
     def _solid_groups(self, groups: Sequence[str] | str | None, consequence: str) -> tuple[str, ...] | None:
         """Return the names of groups of solid cells, or None for all cells.
 
-        Raises a ModelError that ends with `consequence` if a group contains no solid cell.
+        Raises a ModelError whose message ends with `consequence` if a group contains no solid cell.
         """
         names = group_names(groups)
         check_solids(self.mesh, names, consequence)
@@ -178,15 +178,15 @@ class ModelBase(Suggesting):
         return np.array([point])
 
     def _direction(
-        self, name: str, stiffness: Mapping[str, float], between: bool, direction: Sequence[float] | None
+        self, name: str, stiffness: Mapping[str, float], has_two_nodes: bool, direction: Sequence[float] | None
     ) -> Array | None:
         """Return the unit vector (dim,) of the axial direction of a spring, or None if no `direction` is given.
 
-        `stiffness` contains its axial and transverse stiffnesses. A spring `between` two nodes acts along the line between
-        them by default; other springs are fixed to the ground.
+        `stiffness` contains its axial and transverse stiffnesses. If the spring `has_two_nodes`, it acts along the line
+        between them by default; otherwise it is fixed to the ground.
         """
         if direction is None:
-            if stiffness and not between:
+            if stiffness and not has_two_nodes:
                 raise ModelError(
                     f"{name} has an axial or transverse stiffness but no second node: specify it by `to`, give a "
                     "direction, or give stiffnesses along x, y or z instead"
@@ -256,7 +256,7 @@ class ModelBase(Suggesting):
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
 
     def refuse_nonlinear(self, feature: str) -> None:
-        """Raise ModelError if bodies are nonlinear. The message begins with `feature`, which requires linear elasticity."""
+        """Raise ModelError if bodies are nonlinear. The message begins with `feature`, for example "sensitivities are"."""
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
         if self.nonlinear:
             cause = nonlinear[0] if nonlinear else f"strain='{self.strain}'"

@@ -30,7 +30,7 @@ from fastcontact.model.contact_pair import ContactPair, DrivingForce, FluidPress
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions, pair_options
 from fastcontact.model.parts.connections import ModelConnections
-from fastcontact.model.periodicity import same_place
+from fastcontact.model.periodicity import representatives
 from fastcontact.model.ramp import History, table_of
 from fastcontact.model.repeated_pairs import check_repeated, share_facets
 
@@ -432,7 +432,7 @@ class ModelContact(ModelConnections):
         points = secondary.points
         turning = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
         options = dataclasses.replace(
-            options, same_place=same_place(interfaces, self.mesh.n_points), turning=turning,
+            options, representatives=representatives(interfaces, self.mesh.n_points), turning=turning,
             source=self._fluid_source(pair, secondary, options),
         )  # fmt: skip
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)

@@ -18,7 +18,7 @@ from fastcontact.heat.conduction import Conduction, undetermined_bodies
 from fastcontact.heat.loads import Film, FixedTemperature, HeatFlux, Heating, HeatSource, NodalHeat
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.parts.base import ModelBase, group_names
-from fastcontact.model.periodicity import same_place
+from fastcontact.model.periodicity import representatives
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.rigid_motions import body_name
 
@@ -185,7 +185,7 @@ class ModelHeat(ModelBase):
         Nodes share their temperature at the ends of a period or sector and on the two sides of a pretension section.
         """
         cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
-        representative = same_place([*self.periodic_interfaces, *cuts], self.mesh.n_points)  # type: ignore[list-item]
+        representative = representatives([*self.periodic_interfaces, *cuts], self.mesh.n_points)  # type: ignore[list-item]
         return np.arange(self.mesh.n_points) if representative is None else representative
 
     def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:

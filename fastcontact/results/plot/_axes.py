@@ -25,7 +25,8 @@ else:  # Matplotlib is imported only when a plot is drawn
 
 Units = str | Mapping[str, str]
 UNITS: Mapping[str, str] = {"length": "mm", "force": "N", "pressure": "MPa"}
-UNKNOWN: Mapping[str, str] = {}
+# Default of arguments `units`, which selects the units of the model.
+MODEL_UNITS: Mapping[str, str] = {}
 
 
 def units_of(units: Units, result: ContactResult | StepResult) -> Mapping[str, str]:
@@ -170,17 +171,17 @@ def label_axes(
     `artist` has the colour scale of `plot_field`. `points` (n, 2) are those of a plane body [length]; None for 3D axes.
     `alone` states whether the figure has no other axes.
     """
-    caption, length, below = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
+    caption, shrink, legend_height = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
     if points is not None:
         width, height = np.ptp(points, axis=0)
         caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER_WIDTH))
-        length = float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))  # shorter for flat bodies
+        shrink = float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))  # shorter for flat bodies
         half_inch = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
-        below = half_inch if alone else -0.09
+        legend_height = half_inch if alone else -0.09
         axes.set_aspect("equal")
         axes.locator_params(axis="x", nbins=6, steps=[1, 2, 5, 10])  # space for labels such as 0.0025
-    axes.figure.colorbar(artist, ax=axes, label=caption, shrink=length)
+    axes.figure.colorbar(artist, ax=axes, label=caption, shrink=shrink)
     axes.set_title(heading, fontsize="medium", pad=18 if points is None else None)
     axes.set(**{f"{axis}label": axis_label(label, units, "length") for axis, label in zip("xyz", labels)})
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, legend_height))
     return axes

@@ -22,7 +22,7 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import _axes
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, position_text, units_of
+from fastcontact.results.plot._axes import MODEL_UNITS, Axes, Units, new_axes, position_text, units_of
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, fill_triangles, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, show_box, shows_extreme, view_axes, view_of_extreme
@@ -68,7 +68,7 @@ def deformed_shape(
     zoom: float | None = None,
     limits: tuple[float, float] | None = None,
     title: str = "",
-    units: Units = UNKNOWN,
+    units: Units = MODEL_UNITS,
     view: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
@@ -202,7 +202,7 @@ def section(
     edges: bool | None = None,
     zoom: float | None = None,
     title: str = "",
-    units: Units = UNKNOWN,
+    units: Units = MODEL_UNITS,
     ax: Axes | None = None,
 ) -> Axes:
     """Plot a plane section through a 3D mesh, coloured by a field; the value of largest magnitude is marked.
@@ -461,7 +461,7 @@ def animate(
     mirrored: bool = False,
     pictures_per_second: int = 5,
     title: str = "",
-    units: Units = UNKNOWN,
+    units: Units = MODEL_UNITS,
     view: tuple[float, float] = (25.0, -60.0),
 ) -> MovingPicture:
     """Write an animation of the deformed shape over all load steps, with fixed axes and a fixed colour scale.

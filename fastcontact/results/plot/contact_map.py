@@ -14,7 +14,7 @@ from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.layout import CONTACT_FIELDS
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels, units_of
+from fastcontact.results.plot._axes import MODEL_UNITS, Axes, Panels, Units, new_panels, units_of
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.plot.solid import view_axes
 from fastcontact.results.step import ContactResult
@@ -41,7 +41,7 @@ def contact_map(
     everything: bool = False,
     beside: str = "shear",
     title: str = "",
-    units: Units = UNKNOWN,
+    units: Units = MODEL_UNITS,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
     """Plot the pressure on the secondary surface of a contact pair in 3D and another quantity, by default shear.

@@ -15,7 +15,7 @@ from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import _axes
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes, outer_legend, units_of
+from fastcontact.results.plot._axes import MODEL_UNITS, Axes, Units, contacts_of, new_axes, outer_legend, units_of
 from fastcontact.results.step import ContactResult, StepResult, half_width
 from fastcontact.results.units import axis_label, units_of_results, value_text
 
@@ -28,7 +28,7 @@ def pressure_profile(
     other_theories: Mapping[str, Any] | None = None,
     stress: Array | None = None,
     title: str = "",
-    units: Units = UNKNOWN,
+    units: Units = MODEL_UNITS,
     ax: Axes | None = None,
 ) -> Axes:
     """Plot the contact pressure as a function of the distance from the middle, with theories for comparison.
@@ -195,7 +195,7 @@ def axis_stress(
     theories: Mapping[str, Any] | None = None,
     *,
     title: str = "",
-    units: Units = UNKNOWN,
+    units: Units = MODEL_UNITS,
     ax: Axes | None = None,
 ) -> Axes:
     """Plot the stresses at the nodes on the axis of a contact as functions of the depth below the surface.
@@ -342,7 +342,7 @@ def history(
     approach: float | None = None,
     share: float = 1.0,
     title: str = "",
-    units: Units = UNKNOWN,
+    units: Units = MODEL_UNITS,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
     """Plot the force and the contact radius of a contact pair as functions of the load factor or the approach.
@@ -439,7 +439,7 @@ def _plot_bounds(ax: Any, x: Array, bounds: Array) -> None:
 
 @typed(FastcontactError)
 def contact_zones(
-    steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNKNOWN, ax: Axes | None = None
+    steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = MODEL_UNITS, ax: Axes | None = None
 ) -> Axes:
     """Plot at every load step which secondary nodes are open, closed or, with friction, sticking or sliding.
 

@@ -50,7 +50,7 @@ RULES = {
     "gauss_cube": (rules.gauss_cube(3), on_box, 5),
     "tetrahedron_1": (rules.tetrahedron_1(), on_tetrahedron, 1),
     "tetrahedron_5": (rules.tetrahedron_5(), on_tetrahedron, 3),
-    "prism": (rules.prism(rules.triangle_7(), rules.gauss_line(3)), on_prism, 5),
+    "prism": (rules.tensor_product(rules.triangle_7(), rules.gauss_line(3)), on_prism, 5),
     "pyramid_5": (rules.pyramid_5(), on_pyramid, 2),
     "conical_pyramid": (rules.conical_pyramid(3), on_pyramid, 5),
     "conical_pyramid of 16": (rules.conical_pyramid(4), on_pyramid, 7),

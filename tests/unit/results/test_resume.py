@@ -408,7 +408,7 @@ def test_a_step_writes_what_it_adds_and_little_more(
 def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """However little HDF5 may keep, the file holds every step."""
     monkeypatch.setattr(write_arrays, "MAX_SHARED", shared)
-    monkeypatch.setattr(writer, "CACHED_INDICES", 1 << 13)
+    monkeypatch.setattr(writer, "METADATA_CACHE", 1 << 13)
     path, kept = tmp_path / "run.vtkhdf", []
     with ResultWriter(path, MESH) as out:
         for number in range(60):

@@ -33,7 +33,7 @@ def test_two_cubes_are_a_bar(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "begins", "said"),
     [
-        ("*Boundary\n", "*Boundry\n", "*Boundry", r"unknown keyword \*BOUNDRY; is \*BOUNDARY meant"),
+        ("*Boundary\n", "*Boundry\n", "*Boundry", r"unknown keyword \*BOUNDRY: did you mean \*BOUNDARY\?"),
         ("bottom, 3\n", "botom, 3\n", "botom, 3", "set 'botom' is not defined; node sets: bottom, top, x0, y0"),
         ("ss, sm\n", "ss, s_m\n", "ss, s_m", "surface 's_m' is not defined; surfaces: roof, sm, ss"),
         ("elset=up, material=steel", "elset=up, material=brass", "*Solid Section, elset=up",
