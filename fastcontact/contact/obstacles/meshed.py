@@ -10,11 +10,11 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.obstacles._facets import SurfaceFacets, surface_facets
 from fastcontact.contact.projection import (
-    BESIDE,
+    SMALL_OVERHANG,
     Closest,
-    at_common_edges,
     closest_of_kinds,
     distance_from_edges,
+    facets_containing,
     interpolate,
     places,
 )
@@ -117,7 +117,7 @@ class MeshedSurface:
         # At a plane of symmetry, the last facet may be inclined to the smooth surface of the full model by up to half the
         # crease angle. Points slightly beyond its border must therefore remain in contact.
         slope = np.tan(np.radians(0.5 * MeshedSurface.crease))
-        beyond_border = on_border & (overhang > BESIDE * size) & (overhang > slope * height)
+        beyond_border = on_border & (overhang > SMALL_OVERHANG * size) & (overhang > slope * height)
         return np.where(beyond_border, np.inf, distance), normal
 
     def _closest_normals(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
@@ -134,7 +134,7 @@ class MeshedSurface:
         pseudonormal, on_border = np.where(at_node[:, None], at_nodes[node], closest.normal), at_node & border[node]
         rows = np.flatnonzero(on_edge & ~at_node)
         if len(rows):
-            point, common, xi_there = at_common_edges(side, facet[rows], xi[rows])
+            point, common, xi_there = facets_containing(side, facet[rows], xi[rows])
             others = common != facet[rows][point]
             beyond = interpolate(normals[common[others]], places(side, common[others], xi_there[others]))
             np.add.at(pseudonormal, rows[point[others]], beyond)
