@@ -43,7 +43,7 @@ class CohesiveLaw:
         largest of these ratios is one.
     mixed_mode : str
         Fracture energy in mixed mode: ``"bk"`` for the interpolation of Benzeggagh and Kenane, or ``"power"`` for the power
-        law, in which powers of the energies over their limits sum to one.
+        law, in which powers of the ratios of the energies to their limits sum to one.
     """
 
     strength: float

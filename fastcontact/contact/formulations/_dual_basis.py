@@ -86,7 +86,7 @@ def dual_functions(mass: Array, admissible: Mask, fraction: Array) -> tuple[Arra
     ----------
     mass : ndarray (n_facets, k, k)
         Integrals of products of the positive shape functions over the covered part [area].
-    kept : ndarray of bool (n_facets, k)
+    admissible : ndarray of bool (n_facets, k)
         Functions that may have a dual function.
     fraction : ndarray (n_facets, k)
         Integral of each function over the covered part, relative to its integral over the complete facet [-].
@@ -94,7 +94,7 @@ def dual_functions(mass: Array, admissible: Mask, fraction: Array) -> tuple[Arra
     Returns
     -------
     dual, D : ndarray (n_facets, k, k)
-        Coefficients and integrals of the dual functions, described for `biorthogonal`.
+        Coefficients and integrals of the dual functions, see `biorthogonal`.
     """
     with_dual = admissible & (fraction > 0.0)
     dual, D = biorthogonal(mass, with_dual)

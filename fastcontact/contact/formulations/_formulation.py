@@ -271,7 +271,7 @@ class Formulation(ABC):
 
     @cached_property
     def shortest_edge(self) -> float:
-        """Length of the shortest facet, over the order of its shape functions [length]."""
+        """Length of the shortest facet, divided by the order of its shape functions [length]."""
         sizes = [
             np.linalg.norm(np.ptp(self.points[block.facets], axis=1), axis=1) / elements.get(block.element).order
             for block in self.secondary.blocks
