@@ -79,7 +79,7 @@ class CohesiveLaw:
         return onset, 2.0 * energy / (self.stiffness * onset)
 
     def damage(self, opening: Array, sliding: Array, previous: Array) -> Array:
-        """Return the damage (m,) [-] at openings and slidings (m,) [length].
+        """Return the damage (m,) [-] at normal and tangential separations `opening` and `sliding` (m,) [length].
 
         Unless the law is reversible, the damage is at least `previous` (m,).
         """

@@ -257,4 +257,4 @@ def test_reference_coordinates_in_and_beyond_a_facet():
         (False, 0.2, -0.3, 0.0, (0.2, -0.3)), (False, 1.5, 0.0, 0.25, (1.0, 0.0)), (False, -2.0, 3.0, 1.0, (-1.0, 1.0)),
     ):  # fmt: skip
         assert projection_kernels.beyond(triangle, s, t) == pytest.approx(out)
-        assert projection_kernels.inside(triangle, s, t) == pytest.approx(kept)
+        assert projection_kernels.clamped(triangle, s, t) == pytest.approx(kept)
