@@ -104,7 +104,7 @@ def independent_values(side: Surface, field: CompleteFacets, mass: Array, exclud
     ----------
     side : Surface
         The secondary side, with m nodes.
-    field : WholeFacets
+    field : CompleteFacets
         Mass matrices of the complete facets.
     mass : ndarray (n_facets, n_nodes, n_nodes)
         Integrals of products of two shape functions over the covered part of each facet [area].
