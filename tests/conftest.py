@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from models import elastic_model
+from models import pressed_spheres
 from pairwise import mark_the_rest
 
 import fastcontact as fc
@@ -175,10 +175,7 @@ def forma04():
     """A function that sets up the training case on a mesh."""
 
     def make(mesh: fc.Mesh, formulation: str = "node_to_segment", *, contact: bool = True, **options) -> fc.Model:
-        model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
-        if contact:
-            model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation, **options)
-        return model
+        return pressed_spheres(mesh, name="hertz" if contact else None, formulation=formulation, **options)
 
     return make
 
@@ -215,3 +212,16 @@ def small_disk(tmp_path: Path):
         pytest.skip(f"no small file system here: {mounted.stderr.decode().strip()}")
     yield folder
     subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.fixture
+def gmsh():
+    """The module, initialised."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # it is installed, but a library of the system that it needs is not
+        pytest.skip(f"gmsh cannot be imported: {error}")
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    yield gmsh
+    gmsh.finalize()

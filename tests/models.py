@@ -33,6 +33,19 @@ def supported(model, **held):
     return model
 
 
+def pressed_spheres(mesh, by=2.0, name="hertz", material=None, strain="small", **options):
+    """Return the training case on a mesh of half-spheres: each is pressed `by` a length onto the other.
+
+    The `options` are those of the contact, which is left out if `name` is None.
+    """
+    material = material or fc.LinearElastic(E=20_000.0, nu=0.3)
+    held = {"A1A2": "x", "A2B2": {"y": -by}, "A1B1": {"y": by}}
+    model = made_of(mesh, "axisymmetric", material, strain=strain, **held)
+    if name is not None:
+        model.add_contact(name, secondary="CONT1", primary="CONT2", **options)
+    return model
+
+
 def united(**meshes):
     """Return meshes as one, their groups after a keyword: ``united(L_=lower)`` has L_TOP, but keeps L, the body itself."""
     return fc.generate.union(

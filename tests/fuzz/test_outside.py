@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from fuzz_worker import Watch
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.errors import FileError
@@ -97,8 +98,7 @@ def test_numbers_in_another_file_are_refused_untouched(tmp_path, outside, solved
     read(path)
     lead_out(own, name, way, outside)
     watch = Watch(outside)
-    with pytest.raises(FileError, match=r"another file( at .*)?: copy the data into one file"):
-        read(path)
+    refused(FileError, r"another file( at .*)?: copy the data into one file", read, path)
     assert not watch.touched()
     (outside / "bait.h5").read_bytes()
     assert watch.touched()  # it does see
@@ -119,8 +119,7 @@ def test_an_xdmf_file_that_names_a_file_elsewhere_is_refused(tmp_path, outside, 
         item.text = name if form == "Binary" else f"{name}:/numbers"
     document.write(path)
     watch = Watch(outside)
-    with pytest.raises(FileError, match=r"not beside it|does not exist"):
-        read(path)
+    refused(FileError, r"not beside it|does not exist", read, path)
     assert not watch.touched()
 
 
@@ -130,9 +129,7 @@ def test_a_file_that_only_links_to_results_is_no_result_to_write_over(tmp_path, 
     with h5py.File(path, "w") as file:
         file["VTKHDF"] = h5py.ExternalLink(outside / "bait.h5", "/VTKHDF")
     before, watch = path.read_bytes(), Watch(outside)
-    with pytest.raises(FileError, match="is not a result file"):
-        ResultWriter(path, solved[0], overwrite=True)
-    with pytest.raises(FileError, match="refers to another file"):
-        fc.open_results(path)
+    refused(FileError, "is not a result file", ResultWriter, path, solved[0], overwrite=True)
+    refused(FileError, "refers to another file", fc.open_results, path)
     assert not watch.touched()
     assert path.read_bytes() == before

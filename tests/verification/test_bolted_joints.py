@@ -89,10 +89,9 @@ def joint(pull, formulation="mortar", locked_from=1.0, first=1.0, tight=1.0):
     mesh = fc.generate.union(*parts)
     mesh = mesh.with_facet_group("CUT", lambda x: (np.abs(x[:, 1] - half) < 1e-9) & (x[:, 0] < 1.5), between=True)
     mesh = mesh.with_facet_group("HEAD", lambda x: np.abs(x[:, 1] - LENGTH) < 1e-9)
-    model = elastic_model(fc.generate.cut(mesh, "CUT"), "plane_stress", E=E, nu=0.0)
-    model.fix("BOLT BOTTOM", "xy")
-    model.fix("LOW BOTTOM", "xy")
-    model.fix("UP", "x")
+    model = elastic_model(
+        fc.generate.cut(mesh, "CUT"), "plane_stress", E=E, nu=0.0, **{"BOLT BOTTOM": "xy", "LOW BOTTOM": "xy"}, UP="x"
+    )
     model.couple("HEAD", "y")
     model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", formulation=formulation)
     model.add_pretension(

@@ -38,8 +38,7 @@ def two_cubes(lower, upper, divisions=((2, 3, 2), (2, 3, 2))):
 def pressed(mesh, formulation, swap=False, push=0.01, **options):
     model = elastic_model(mesh, "3d", E=E, nu=NU)
     for name in ("LOWER", "UPPER"):
-        model.fix(f"{name}_XMIN", "x")
-        model.fix(f"{name}_YMIN", "y")
+        supported(model, **{f"{name}_XMIN": "x", f"{name}_YMIN": "y"})
     supported(model, LOWER_ZMIN="z", UPPER_ZMAX={"z": -push})
     sides = ("UPPER_ZMIN", "LOWER_ZMAX") if swap else ("LOWER_ZMAX", "UPPER_ZMIN")
     model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
@@ -179,13 +178,3 @@ def test_a_sphere_on_an_elastic_block_agrees_with_hertz_at_equal_force(formulati
     hertz = fc.analytic.hertz_point(E1=20_000.0, nu1=0.3, R1=50.0, E2=20_000.0, nu2=0.3, force=force)
     assert pressure == pytest.approx(hertz.pressure_max, rel=0.02)
     assert radius == pytest.approx(hertz.radius, rel=0.02)
-
-
-def test_results_of_three_dimensions_go_to_a_file_and_back(tmp_path):
-    model = pressed(two_cubes("mixed", "mixed"), "node_to_segment")
-    with fc.ResultWriter(tmp_path / "pair.vtkhdf", model) as out:
-        last = fc.solve(model, fc.linear_ramp(1), on_step=out.write)[-1]
-    read = fc.open_results(tmp_path / "pair.vtkhdf")[-1].contact["pair"]
-    assert np.array_equal(read.force, last.contact["pair"].force)
-    assert np.array_equal(read.pressure, last.contact["pair"].pressure)
-    assert np.array_equal(read.abscissa, last.contact["pair"].abscissa)

@@ -182,32 +182,6 @@ def test_plastic_history_turns_with_the_body() -> None:
     np.testing.assert_allclose(only_turned.history["hex20"], yielded["hex20"], rtol=1e-10, atol=1e-12)
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(
-    ("kinematics", "element"), [("plane_strain", "quad4"), ("plane_strain", "tri6"), ("3d", "hex8")]
-)
-def test_simple_shear(kinematics: str, element: str, law: str) -> None:
-    """Every node moves along x by its height."""
-    material, energy = LAWS[law]
-    solid = kinematics == "3d"
-    mesh = fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element=element) if solid else fc.generate.block(element=element)
-    model = made_of(mesh, kinematics, material, strain="finite")
-    bottom, top, sides = ("YMIN", "YMAX", ("XMIN", "XMAX")) if solid else ("BOTTOM", "TOP", ("LEFT", "RIGHT"))
-    model.fix(bottom, "x")
-    model.prescribe(top, x=0.4)
-    for side in sides:
-        model.prescribe(side, x=lambda points: 0.4 * points[:, 1])
-    for group in (bottom, top, *sides):
-        model.fix(group, "y")
-    if solid:
-        model.fix("BOX", "z")
-    step = fc.solve(model, 2)[-1]
-    exact = cauchy(energy, np.array([[1.0, 0.4, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))[0, 1]
-    inside = np.setdiff1d(np.arange(mesh.n_points), np.concatenate([mesh.points_of(side) for side in sides]))
-    assert step.displacement[inside, 0] == pytest.approx(0.4 * mesh.points[inside, 1], abs=1e-9)
-    assert step.stress[:, 3] == pytest.approx(exact, rel=1e-9)
-
-
 def tube(element: str, count: int) -> fc.Model:
     """Return the wall of a tube, 1 to 2, that keeps its length: nearly incompressible, of shear modulus 1."""
     mesh = fc.generate.block((1.0, 0.05), (count, 1), element=element, origin=(1.0, 0.0))
@@ -246,18 +220,6 @@ def test_the_elastica(element: str) -> None:
     model.add_traction("RIGHT", y=-10.0 * E * depth**3 / 12.0 / length**2 / depth)
     tip = fc.solve(model, 5)[-1].displacement[mesh.points_of("RIGHT")].mean(axis=0)
     assert -tip / length == pytest.approx([0.55500, 0.81061], rel=2e-3)
-
-
-@pytest.mark.filterwarnings("ignore:a displacement of 2 is prescribed")
-def test_rigid_rotation_by_90_degrees_leaves_no_stress() -> None:
-    mesh = fc.generate.block((1.0, 1.0), (3, 3), element="quad8")
-    model = elastic_model(mesh, "plane_strain", E=1.0, strain="finite")
-    for side in ("BOTTOM", "TOP", "LEFT", "RIGHT"):
-        model.prescribe(
-            side, x=lambda points: -points[:, 0] - points[:, 1], y=lambda points: points[:, 0] - points[:, 1]
-        )
-    steps = fc.solve(model, 1)
-    assert np.abs(steps[-1].stress).max() <= 1e-10
 
 
 YIELDING = {

@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, pressed_spheres
 
 import fastcontact as fc
 
 
 def spheres(**options):
     mesh = fc.generate.half_spheres(element="quad8", segments=16)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment", **options)
+    model = pressed_spheres(mesh, 1.0, formulation="node_to_segment", **options)
     return fc.solve(model, 1)[-1]
 
 

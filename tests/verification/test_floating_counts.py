@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import plates
+from models import plates, supported
 
 import fastcontact as fc
 
@@ -29,8 +29,7 @@ def wedge():
     right = leaning(right, lambda x, half: 4.0 - (4.0 - x) * (4.0 - half) / 4.0)
     model = fc.Model(fc.generate.union(left, right, leaning(middle, lambda x, half: x * half)), "plane_strain")
     model.add_material(fc.LinearElastic(2e5, 0.3))
-    model.fix("LEFT0", "xy")
-    model.fix("RIGHT1", "xy")
+    supported(model, LEFT0="xy", RIGHT1="xy")
     model.add_pressure("TOP2", 10.0)
     model.add_contact("l", secondary="LEFT2", primary="RIGHT0", friction=0.3)
     model.add_contact("r", secondary="RIGHT2", primary="LEFT1", friction=0.3)
@@ -54,8 +53,7 @@ def gasket():
     model = fc.Model(fc.generate.union(*rings), "3d")
     for i, E in enumerate((2e5, 2e3, 2e5)):
         model.add_material(fc.LinearElastic(E, 0.3), groups=[f"BOX{i}"])
-        model.fix(f"YMIN{i}", "y")
-        model.fix(f"YMAX{i}", "x")
+        supported(model, **{f"YMIN{i}": "y", f"YMAX{i}": "x"})
     model.fix("ZMIN0", "z")
     model.add_pressure("ZMAX2", 10.0)
     model.add_contact("lower", secondary="ZMIN1", primary="ZMAX0", friction=0.3)

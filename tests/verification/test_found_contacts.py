@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of
+from models import elastic_model, made_of, supported
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -180,12 +180,10 @@ def test_softer_bodies_are_secondary_even_with_coarser_meshes(element):
         )
         for name, size, n, y in parts
     )
-    model = fc.Model(union(strip, base), "plane_strain")
-    model.add_material(fc.LinearElastic(E=200e3, nu=0.3), "STRIP")
-    model.add_material(fc.LinearElastic(E=500.0, nu=0.3), "BASE")
+    materials = {"STRIP": fc.LinearElastic(E=200e3, nu=0.3), "BASE": fc.LinearElastic(E=500.0, nu=0.3)}
+    model = made_of(union(strip, base), "plane_strain", materials)
     for body in ("STRIP", "BASE"):
-        model.fix(f"{body} LEFT", "x")
-        model.fix(f"{body} RIGHT", "x")
+        supported(model, **{f"{body} LEFT": "x", f"{body} RIGHT": "x"})
     model.fix("BASE BOTTOM", "y")
     model.add_pressure("STRIP TOP", lambda x: 10.0 * np.exp(-((x[:, 0] / 4.0) ** 2)))
     exchanged = copy.copy(model)

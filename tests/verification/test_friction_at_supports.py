@@ -185,9 +185,7 @@ def test_bolted_flanges_held_at_the_same_edge_settle_and_mirror_each_other(frict
     mesh = fc.generate.union(flange("A", 0.0), flange("B", 8.0))
     model = elastic_model(mesh, "3d", E=210e3)
     for name, outside in (("A", "ZMIN"), ("B", "ZMAX")):
-        model.fix(f"{name}_XMIN", "xyz")
-        model.fix(f"{name}_YMIN", "y")
-        model.fix(f"{name}_YMAX", "x")
+        supported(model, **{f"{name}_XMIN": "xyz", f"{name}_YMIN": "y", f"{name}_YMAX": "x"})
         model.add_pressure(f"{name}_{outside}", lambda x: 2.0 * (60.0 - np.linalg.norm(x[:, :2], axis=1)))
     model.add_contact("joint", secondary="B_ZMIN", primary="A_ZMAX", friction=friction)
     step = fc.solve(model, 1, criteria=fc.Criteria(max_geometry_updates=10, max_halvings=0))[-1]

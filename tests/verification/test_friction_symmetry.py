@@ -9,7 +9,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -107,8 +107,7 @@ def test_mirrored_bodies_in_space_stay_mirrored(formulation, exact):
     model = elastic_model(mesh, "3d", E=20_000.0)
     for side, approach in (("U", -1.0), ("L", 1.0)):
         model.fix(f"{side}_SYMMETRY_X", "x")
-        model.fix(f"{side}_SYMMETRY_Z", "z")
-        model.prescribe(f"{side}_SPHERE_TOP", y=approach)
+        supported(model, **{f"{side}_SYMMETRY_Z": "z", f"{side}_SPHERE_TOP": {"y": approach}})
     sides = {"secondary": "U_CONT_SPHERE", "primary": "L_CONT_SPHERE"}
     model.add_contact("pair", formulation=formulation, friction=0.3, **sides)
     step = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, pressed_spheres, supported, united
 from stepping import Stepping
 
 import fastcontact as fc
@@ -163,10 +163,8 @@ def test_works_add_up_however_few_the_steps(formulation, penalty):
     """A contact that grows: the mean of the forces at both ends of one step would tell 27 % more than the energy."""
     found = []
     for count in (1, 5):
-        model = fc.Model(fc.generate.half_spheres("quad4", arc_sizes=(3.0, 9.0), segments=3), "axisymmetric")
-        model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-        supported(model, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0})
-        model.add_contact("c", secondary="CONT1", primary="CONT2", formulation=formulation, penalty=penalty)
+        mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 9.0), segments=3)
+        model = pressed_spheres(mesh, formulation=formulation, penalty=penalty)
         found.append(fc.solve(model, count)[-1].work)
     for told in found:
         assert told["external_work"] == pytest.approx(told["strain_energy"] + told["penalty_energy"], rel=2e-3)
@@ -240,11 +238,9 @@ def test_work_of_friction_between_bodies_does_not_depend_on_the_number_of_steps(
     size = {"arc_sizes": (0.5, 4.0), "segments": 3} if element == "quad4" else {"size": 6.0, "contact_size": 0.8}
     works = []
     for n, fraction in ((40, 1.0), (5, None), (1, None)):
-        model = fc.Model(fc.generate.half_spheres(element, **size), "axisymmetric")
-        model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), groups=["SPHHAU"])
-        model.add_material(fc.LinearElastic(E=2e6, nu=0.3), groups=["SPHBAS"])
-        supported(model, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": 0.5})
-        model.add_contact("pair", secondary="CONT1", primary="CONT2", friction=0.05)
+        bodies = {"SPHHAU": fc.LinearElastic(E=20_000.0, nu=0.3), "SPHBAS": fc.LinearElastic(E=2e6, nu=0.3)}
+        mesh = fc.generate.half_spheres(element, **size)
+        model = pressed_spheres(mesh, 0.5, material=bodies, friction=0.05)
         criteria = fc.Criteria(friction_while_touching=fraction)
         works.append(fc.solve(model, n, criteria=criteria)[-1].work["friction_work"])
     assert works[1:] == [pytest.approx(works[0], rel=error) for error in (0.05, 0.15)]

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, made_of
 
 import fastcontact as fc
 
@@ -62,10 +62,8 @@ def test_a_cylinder_driven_by_its_force_on_an_elastic_block(formulation):
     bodies = {"E1": 1000.0, "nu1": 0.3, "E2": 4000.0, "nu2": 0.2}
     theory = fc.analytic.hertz_line(**bodies, R1=50.0, radius=2.0)
     mesh = fc.generate.cylinder_on_block("quad8", R=50.0, size=8.0, contact_size=0.25)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=bodies["E1"], nu=bodies["nu1"]), "CYLINDER")
-    model.add_material(fc.LinearElastic(E=bodies["E2"], nu=bodies["nu2"]), "BLOCK")
-    supported(model, AXIS="x", BLOCK_BOTTOM="y")
+    materials = {"CYLINDER": fc.LinearElastic(E=1000.0, nu=0.3), "BLOCK": fc.LinearElastic(E=4000.0, nu=0.2)}
+    model = made_of(mesh, "plane_strain", materials, AXIS="x", BLOCK_BOTTOM="y")
     model.couple("CYLINDER_TOP", "y")
     model.add_force("CYLINDER_TOP", y=-theory.force / 2)
     model.add_contact("hertz", secondary="CONT_CYLINDER", primary="CONT_BLOCK", formulation=formulation)

@@ -237,8 +237,7 @@ def test_linear_triangles_and_tetrahedra_lock_and_a_warning_says_so(element: str
     else:
         mesh, bottom, top = fc.generate.block((1.0, 0.5), (4, 2), element=element), "BOTTOM", "TOP"
     model = made_of(mesh, "3d" if solid else "plane_strain", law, strain="finite" if law is LAW else "small")
-    model.fix(bottom, "xyz"[: mesh.dim])
-    model.fix(top, "xy"[: mesh.dim - 1])
+    supported(model, **{bottom: "xyz"[: mesh.dim], top: "xy"[: mesh.dim - 1]})
     model.prescribe(top, **{"xyz"[mesh.dim - 1]: -0.05})
     told = any("cells lock" in text for text in fc.solve(model, 2)[-1].warnings)
     assert told == (element in ("tri3", "tet4"))

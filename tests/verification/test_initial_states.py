@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from case_texts import of_block
-from models import elastic_model, supported
+from models import elastic_model, made_of
 from test_temperature import ALPHA, RISE, E, free, plane, solved
 from two_bodies import rings
 
@@ -119,10 +119,8 @@ def test_a_shrunk_hub_presses_as_lame_says():
     strain = -1.2e-3
     pressures = []
     for axes, names in ((None, ("xx", "yy")), (fc.CylindricalAxes(), ("xx", "yy"))):
-        model = fc.Model(mesh, "plane_strain")
-        model.add_material(fc.LinearElastic(1000.0, 0.3), "SHAFT")
-        model.add_material(fc.LinearElastic(500.0, 0.25), "HUB")
-        supported(model, XAXIS="y", YAXIS="x")
+        materials = {"SHAFT": fc.LinearElastic(1000.0, 0.3), "HUB": fc.LinearElastic(500.0, 0.25)}
+        model = made_of(mesh, "plane_strain", materials, XAXIS="y", YAXIS="x")
         model.add_contact("fit", secondary="HUB_INNER", primary="SHAFT_OUTER", formulation="mortar")
         model.add_initial_strain("HUB", **dict.fromkeys(names, strain), axes=axes)
         last = solved(model)

@@ -60,19 +60,6 @@ def test_unloading_until_bodies_part_leaves_nothing(formulation, forma04):
     assert np.abs(steps[2].stress).max() < 1e-9 * np.abs(steps[0].stress).max()
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("make", [blocks, boxes])
-def test_swapping_sides_of_meshes_that_match_changes_nothing(make, formulation):
-    mesh = make()
-    kinematics = "3d" if mesh.dim == 3 else "plane_strain"
-    one, other = (
-        fc.solve(touching(held(mesh, kinematics), formulation, swap, clearance=0.004), fc.linear_ramp(1))[-1]
-        for swap in (False, True)
-    )  # fmt: skip
-    same(one, other, 1e-12)
-    assert one.contact["pair"].force == pytest.approx(-other.contact["pair"].force, rel=1e-10, abs=1e-10)
-
-
 RAMP = fc.Ramp((0.5, 1.0, 2.0, 3.0, 4.0), ((0.0, 0.0), (1.0, 1.0), (9.0, 1.0)))
 OF_CONSTANT_LOAD = [
     {"formulation": "continuous"},

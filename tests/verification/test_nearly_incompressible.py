@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of
+from models import elastic_model, made_of, pressed_spheres, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -45,8 +45,7 @@ def pad(element, n, kinematics="plane_strain", solver="direct"):
     mesh = mesh.replace(points=mesh.points - mesh.points.min(axis=0))
     model = elastic_model(mesh, kinematics, E=3.0, nu=NU)
     bottom, top, up = ("ZMIN", "ZMAX", "z") if solid else ("BOTTOM", "TOP", "y")
-    model.fix(bottom, "xyz"[: mesh.dim])
-    model.fix(top, "xy" if solid else "x")
+    supported(model, **{bottom: "xyz"[: mesh.dim], top: "xy" if solid else "x"})
     model.prescribe(top, **{up: -0.01})
     for group, axis in (("XMIN", "x"), ("YMIN", "y")) if solid else (("LEFT", "x"),):
         model.fix(group, axis)  # symmetry
@@ -77,8 +76,7 @@ def hertz(element, nu, coarseness):
     mesh = fc.generate.half_spheres(
         element, arc_sizes=(0.2 * coarseness, 2 * coarseness), segments=int(15 / coarseness)
     )
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, nu=nu, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    model = pressed_spheres(mesh, 1.0, material=fc.LinearElastic(E=20_000.0, nu=nu))
     contact = fc.solve(model, 1)[-1].contact["hertz"]
     return np.array([np.abs(contact.force[1]), contact.pressure.max()])
 

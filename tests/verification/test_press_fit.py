@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of
+from models import elastic_model, made_of, supported
 from two_bodies import rings
 
 import fastcontact as fc
@@ -96,8 +96,7 @@ def tubes(element, n, along):
     ]  # fmt: skip
     model = made_of(fc.generate.union(*named), "axisymmetric", {"SHAFT": SHAFT, "HUB": HUB})
     for part in ("SHAFT", "HUB"):
-        model.fix(f"{part}_TOP", "y")
-        model.fix(f"{part}_BOTTOM", "y")
+        supported(model, **{f"{part}_TOP": "y", f"{part}_BOTTOM": "y"})
     return model
 
 
@@ -175,10 +174,7 @@ def test_a_strip_one_facet_wide_is_smoothed_as_one_two_facets_wide(element, pres
             parts.append(renamed(mesh, {group: name + group for group in mesh.group_names if group != name}))
         model = made_of(union(*parts), "3d", SHAFT)
         for name in "AB":
-            model.fix(f"{name}YMIN", "y")
-            model.fix(f"{name}YMAX", "normal")
-            model.fix(f"{name}ZMIN", "z")
-            model.fix(f"{name}ZMAX", "z")
+            supported(model, **{f"{name}YMIN": "y", f"{name}YMAX": "normal", f"{name}ZMIN": "z", f"{name}ZMAX": "z"})
         sides = ("BXMIN", "AXMAX") if swap else ("AXMAX", "BXMIN")
         model.add_contact("fit", secondary=sides[0], primary=sides[1], clearance=-1e-3)
         found.append(fc.solve(model, 1)[-1].contact["fit"])
@@ -205,8 +201,7 @@ def test_friction_between_planes_of_symmetry_has_no_shear(options, element, coun
         parts.append(renamed(mesh, {group: name + group for group in mesh.group_names if group != name}))
     model = made_of(union(*parts), "plane_strain", SHAFT)
     for name in "AB":
-        model.fix(f"{name}BOTTOM", "y")
-        model.fix(f"{name}TOP", "normal")
+        supported(model, **{f"{name}BOTTOM": "y", f"{name}TOP": "normal"})
     sides = {"secondary": "ARIGHT", "primary": "BLEFT"}
     model.add_contact("fit", friction=0.3, clearance=-1e-3, **sides, **options)
     contact = fc.solve(model, 1)[-1].contact["fit"]

@@ -87,11 +87,8 @@ def fitted(element, inner, outer, **options):
         divisions_inner=inner,
         divisions_outer=outer,
     )
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(210_000.0, 0.3), groups=["INNER"])
-    model.add_material(fc.LinearElastic(70_000.0, 0.33), groups=["OUTER"])
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
+    materials = {"INNER": fc.LinearElastic(210_000.0, 0.3), "OUTER": fc.LinearElastic(70_000.0, 0.33)}
+    model = made_of(mesh, "plane_strain", materials, SYMMETRY_X="x", SYMMETRY_Y="y")
     model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.05, **options)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")

@@ -6,7 +6,7 @@ Keer, Dundurs and Tsai (1972): the half-width of the contact does not depend on 
 import numpy as np
 import pytest
 from graded import graded_block, lines
-from models import elastic_model
+from models import elastic_model, made_of
 
 import fastcontact as fc
 
@@ -38,10 +38,8 @@ def on_elastic_base(formulation, size, ratio):
     x, depth = lines(0.8 * size, 3.0, 200.0, growth=1.3), lines(size, 0.0, 200.0, growth=1.3)
     names = {"BLOCK": "BASE", "TOP": "CONT_BASE", "BOTTOM": "FAR", "LEFT": "AXIS"}
     base = fc.generate.renamed(graded_block(x, -depth[::-1], "quad4"), names.get)
-    model = fc.Model(fc.generate.union(base, layer(size)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=NU), "LAYER")
-    model.add_material(fc.LinearElastic(E=E / ratio, nu=NU), "BASE")
-    model.fix("FAR", "y")
+    materials = {"LAYER": fc.LinearElastic(E=E, nu=NU), "BASE": fc.LinearElastic(E=E / ratio, nu=NU)}
+    model = made_of(fc.generate.union(base, layer(size)), "plane_strain", materials, FAR="y")
     model.add_contact("base", secondary="CONT_LAYER", primary="CONT_BASE", formulation=formulation)
     return [step.contact["base"] for step in pressed(model, 2)]
 

@@ -5,7 +5,7 @@ of the mesh; Hertz's powers of the force to 7 %.
 """
 
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, made_of, supported
 
 import fastcontact as fc
 
@@ -42,10 +42,8 @@ def press_fit_pressure(a, b, c, E, nu, E_hub, nu_hub, interference):
 
 def test_the_press_fit_of_lame():
     mesh = fc.generate.rings("quad8", divisions_inner=(4, 12), divisions_outer=(6, 12))
-    model = fc.Model(mesh, kinematics="plane_stress")
-    model.add_material(fc.LinearElastic(E=2e5, nu=0.3), "INNER")
-    model.add_material(fc.LinearElastic(E=7e4, nu=0.25), "OUTER")
-    supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
+    materials = {"INNER": fc.LinearElastic(E=2e5, nu=0.3), "OUTER": fc.LinearElastic(E=7e4, nu=0.25)}
+    model = made_of(mesh, "plane_stress", materials, SYMMETRY_X="x", SYMMETRY_Y="y")
     # So small that the radius at which the parts meet stays the same, as in the formula.
     model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-1e-4)
     step = fc.solve(model, 1, criteria=TIGHT)[-1]

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -16,9 +17,7 @@ def test_pressures_at_ends_that_slide_past_each_other_are_told(slide, multiplier
     mesh = fc.generate.block_on_block(
         size_lower=(10.0, 5.0), size_upper=(10.0, 5.0), divisions_lower=(10, 5), divisions_upper=(10, 5)
     )
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
     model.add_periodicity("LOWER_LEFT", "LOWER_RIGHT")
     model.add_periodicity("UPPER_LEFT", "UPPER_RIGHT")
     model.add_pressure("UPPER_TOP", 5.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])

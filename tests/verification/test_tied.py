@@ -104,8 +104,7 @@ def test_ties_are_determined_where_supports_hold_both_sides(element, formulation
     )
     for kinematics in ["plane_strain", *["axisymmetric"] * (said == "x")] if flat else ["3d"]:
         for swap in (False, True):
-            model = elastic_model(mesh, kinematics)
-            model.fix(bottom, "xyz"[: mesh.dim])
+            model = elastic_model(mesh, kinematics, **{bottom: "xyz"[: mesh.dim]})
             for side in left:
                 if said == "relation":
                     for point in set(mesh.points_of(side)).difference(mesh.points_of(bottom)):

@@ -29,8 +29,7 @@ def held(mesh, kinematics="plane_strain", approach=0.02):
     model = elastic_model(mesh, kinematics, E=YOUNG, nu=POISSON)
     if kinematics == "3d":
         for side in "LU":
-            model.fix(f"{side}_XMIN", "x")
-            model.fix(f"{side}_YMIN", "y")
+            supported(model, **{f"{side}_XMIN": "x", f"{side}_YMIN": "y"})
         supported(model, L_ZMIN="z", U_ZMAX={"z": -approach})
     else:
         supported(model, LOWER_LEFT="x", UPPER_LEFT="x", LOWER_BOTTOM="y", UPPER_TOP={"y": -approach})

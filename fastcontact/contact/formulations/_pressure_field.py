@@ -41,6 +41,7 @@ from fastcontact.contact.integration import NO_AREA
 from fastcontact.contact.linearised_geometry import LinearisedPoints
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -219,6 +220,11 @@ class PressureFieldFormulation(Formulation):
         In 3D without friction they can eliminate the values of the field, which friction would couple in all directions.
         """
         return self.points.shape[1] == 3 and not self.friction
+
+    @property
+    def linearised_at_mean(self) -> bool:
+        """See `Formulation`; the error of a Newton step is a tenth of that at the displacements of the pairing."""
+        return isinstance(self.primary, Surface)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -25,14 +25,6 @@ def threads(monkeypatch):
     return use
 
 
-@pytest.mark.parametrize("count", [1, 2, 7])
-def test_ranges_cover_everything_once(threads, count):
-    threads(count)
-    found = parallel.portions(20)
-    assert len(found) == count
-    assert [k for low, high in found for k in range(low, high)] == list(range(20))
-
-
 @pytest.mark.parametrize("count", [1, 2, 7, 40])
 def test_every_point_has_an_owner_that_sees_all_its_cells(threads, count):
     threads(count)
@@ -76,11 +68,6 @@ def test_parts_work_on_equally_many_cells(threads, element):
         assert all(
             np.any(owner[cells[low:high]] == part, axis=1).sum() == work[part] for part, (low, high) in enumerate(parts)
         )
-
-
-def test_little_work_is_not_shared():
-    little = parallel.SINGLE_THREAD_WORK // parallel.NODES
-    assert parallel.portions(little) == [(0, little)]
 
 
 def test_a_fifth_of_the_cells_is_worthwhile_with_five_times_the_nodes(monkeypatch):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported, united
+from models import elastic_model, made_of, pressed_spheres, supported, united
 from stepping import Stepping
 
 import fastcontact as fc
@@ -36,10 +36,8 @@ def stacked(ratio=1.0, friction=0.3, formulation="node_to_segment", dim=3, unit=
         bottom, top = "BOTTOM", "TOP"
     mesh = united(L_=low, U_=up)
     mesh = fc.Mesh(mesh.points * size, mesh.cells, mesh.cell_groups, mesh.point_groups)
-    model = fc.Model(mesh, "3d" if dim == 3 else "plane_strain")
-    model.add_material(fc.LinearElastic(E, 0.3), groups=["L_BLOCK"])
-    model.add_material(fc.LinearElastic(E * ratio, 0.3), groups=["U_BLOCK"])
-    model.fix("L_" + bottom, "xyz"[:dim])
+    materials = {"L_BLOCK": fc.LinearElastic(E, 0.3), "U_BLOCK": fc.LinearElastic(E * ratio, 0.3)}
+    model = made_of(mesh, "3d" if dim == 3 else "plane_strain", materials, **{"L_" + bottom: "xyz"[:dim]})
     moved = {"x": 0.2 * DEPTH * size, "y": 0.0, axis: -DEPTH * size}
     model.prescribe("U_" + top, **moved)
     model.add_contact("c", secondary="U_" + bottom, primary="L_" + top, formulation=formulation, friction=friction)
@@ -184,8 +182,7 @@ def test_a_lowered_tolerance_is_remembered():
 @pytest.mark.parametrize("criteria", [{"geometry": 1e-2}, {"relative": 1e-2}])
 def test_what_loose_criteria_leave_is_told_with_its_number(criteria):
     mesh = fc.generate.half_spheres("tri3", size=5.0)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    model = pressed_spheres(mesh)
     solver = "direct" if "geometry" in criteria else "pyamg"
     text = "still changed by" if "geometry" in criteria else "forces are out of balance by"
     with pytest.warns(fc.FastcontactWarning, match=text + r" \d\.\de-0[34]"):

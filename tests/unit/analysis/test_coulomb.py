@@ -34,7 +34,7 @@ def problem(rng, most_friction):
     free[0] -= rng.uniform(0, 2)
     mu = np.full(m, 10.0 ** rng.uniform(-2, np.log10(most_friction)))
     if rng.random() < 0.5:
-        mu *= rng.uniform(0, 1, m)
+        mu *= rng.uniform(0, 1, m) * (rng.random(m) < 0.8)  # some have no friction
     return 10.0 ** rng.uniform(-6, 6) * F, 10.0 ** rng.uniform(-6, 6) * free, mu
 
 
@@ -63,36 +63,6 @@ def test_one_constraint_by_hand(tangential):
     np.testing.assert_allclose(found.gaps.ravel(), [0.0, tangential + 0.5 * t], atol=1e-14)
     assert found.closed.all()
     assert found.sticking[0] == (abs(tangential) < 0.5)
-
-
-def test_slip_in_three_dimensions_opposes_the_force():
-    F = np.diag([1.0, 0.5, 0.5])  # the same in all tangential directions: slip goes straight along the free slip
-    free = np.array([[-1.0], [3.0], [4.0]])
-    found = solved(F, free, np.array([0.4]))
-    np.testing.assert_allclose(found.y.ravel(), [1.0, -0.4 * 0.6, -0.4 * 0.8], rtol=1e-12)
-    assert not found.sticking.any()
-    assert -(found.y[1:] * found.gaps[1:]).sum() == pytest.approx(0.4 * (5.0 - 0.5 * 0.4), rel=1e-12)
-
-
-def test_in_three_dimensions_an_in_plane_problem_is_that_of_two():
-    rng = np.random.default_rng(3)
-    m, mu = 6, np.full(6, 0.4)
-    F, free = compliance(rng, 2 * m), rng.normal(size=(2, m)) - [[1.0], [0.0]]
-    wide = np.zeros((3 * m, 3 * m))
-    wide[: 2 * m, : 2 * m], wide[2 * m :, 2 * m :] = F, np.eye(m)
-    plane, space = solved(F, free, mu), solved(wide, np.vstack([free, np.zeros(m)]), mu)
-    np.testing.assert_allclose(space.y[:2], plane.y, atol=1e-10 * np.abs(plane.y).max())
-    assert np.abs(space.y[2]).max() <= 1e-12 * np.abs(plane.y).max()
-    np.testing.assert_array_equal(space.sticking, plane.sticking)
-
-
-def test_without_friction_it_is_the_complementarity_problem():
-    rng = np.random.default_rng(5)
-    F, free = compliance(rng, 16), rng.normal(size=(2, 8))
-    found = solved(F, free, np.zeros(8))
-    assert np.abs(found.y[1]).max() == 0.0
-    assert not found.sticking.any()
-    assert residual(F, free, np.zeros(8), found.y) <= 1e-12
 
 
 def test_nothing_closed_is_no_force():
@@ -131,9 +101,8 @@ def test_constraints_that_repeat_each_other_share_the_force():
     np.testing.assert_allclose(both.y.sum(axis=1), one.y[:, 0], rtol=1e-9)
 
 
-@pytest.mark.parametrize("patience", [cone_newton.MAX_NEWTON_ITERATIONS, 1])
-def test_the_second_method_solves_where_newton_does_not(monkeypatch, patience):
-    monkeypatch.setattr(cone_newton, "MAX_NEWTON_ITERATIONS", patience)
+def test_the_second_method_solves_where_newton_does_not(monkeypatch):
+    monkeypatch.setattr(cone_newton, "MAX_NEWTON_ITERATIONS", 1)
     rng = np.random.default_rng(23)
     for _ in range(100):
         m = rng.integers(1, 9)

@@ -34,8 +34,7 @@ def pressed(kinematics, element, pieces, options, curvature=0.0):
     groups, side = dict(mesh.cell_groups), mesh.cell_groups[secondary]
     for i, (begin, end) in enumerate(zip(CUTS[pieces][:-1], CUTS[pieces][1:], strict=True)):
         groups[f"PIECE{i}"] = side[(middle[side] > begin) & (middle[side] < end)]
-    model = elastic_model(mesh.replace(cell_groups=groups), kinematics)
-    model.fix(bottom, "xyz"[: mesh.dim])
+    model = elastic_model(mesh.replace(cell_groups=groups), kinematics, **{bottom: "xyz"[: mesh.dim]})
     along = {"3d": {"x": 0.004, "y": 0.001}, "plane_strain": {"x": 0.004}, "axisymmetric": {}}[kinematics]
     model.prescribe(top, **along, **{"xyz"[mesh.dim - 1]: -0.01})
     if kinematics == "axisymmetric":

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, plates, united
+from models import elastic_model, made_of, plates, supported, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -242,8 +242,7 @@ def stack(dim, weakest, angle, options):
     model = made_of(mesh, "plane_strain" if dim == 2 else "3d", fc.LinearElastic(E=50.0, nu=0.3, density=1e-9))
     model.add_gravity(**dict(zip("xyz", -1e4 * turn[:, -1], strict=False)), ramp=[(0, 0), (1, 1), (4, 1)])
     drive = dict(zip("xyz", 5.0 * turn[:, 0], strict=False))
-    model.prescribe(f"A_{low}", **drive, ramp=[(0, 0), (1, 0), (2, 1), (4, -1)])
-    model.fix(f"D_{side}", "normal")
+    supported(model, **{f"A_{low}": {**drive, "ramp": [(0, 0), (1, 0), (2, 1), (4, -1)]}, f"D_{side}": "normal"})
     for i, (below, above) in enumerate(("AB", "BC", "CD")):
         friction = (30.0 if i == weakest else 36.0) / WIDTHS[i + 1 :].sum()
         model.add_contact(

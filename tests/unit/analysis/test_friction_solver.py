@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import DenseCompliance, elastic_model, made_of, pressed_spheres
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
@@ -35,22 +35,12 @@ def test_tangents_complete_normals(dim):
     np.testing.assert_allclose(normals(tangents(normal)), normal, atol=1e-15)
 
 
-class Coupling:
-    """A compliance that couples the vectors of all constraints."""
-
-    def __init__(self, C):
-        self.C = C
-
-    def block(self, rows):
-        return self.C[np.ix_(rows, rows)]
-
-
 def componentwise(C, along):
     """The compliance C of force vectors as that of their components, which is added to an operator of zeros."""
     (k, m, dim), F = along.shape, np.zeros(2 * ((1 + len(along)) * len(C),))
     rows = csr_array((m, m * dim))
     positions = np.zeros((m, dim))
-    constraints = Constraints(rows, np.zeros(m), positions, Coupling(C), k * (rows,), tuple(along))
+    constraints = Constraints(rows, np.zeros(m), positions, DenseCompliance(C), k * (rows,), tuple(along))
     friction._add_compliance(F, constraints, np.arange(m))
     return F
 
@@ -140,10 +130,9 @@ def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
 
 
 def spheres(friction=0.0):
-    model = elastic_model(fc.generate.half_spheres("tri3", size=8.0), "axisymmetric", E=20_000.0, A1A2="x")
-    supported(model, A2B2={"y": -2.0}, A1B1={"y": 2.0})
-    model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
-    return model
+    return pressed_spheres(
+        fc.generate.half_spheres("tri3", size=8.0), name="pair", formulation="node_to_segment", friction=friction
+    )
 
 
 def pressed(criteria, steps):
@@ -244,9 +233,8 @@ def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
 
 def test_a_verdict_about_a_diverged_iterate_does_not_end_the_analysis(monkeypatch):
     """An iterate far from equilibrium may seem to lie beyond the friction cone; a smaller step is tried."""
-    model = fc.Model(fc.generate.block((2.0, 1.0), (8, 4)), kinematics="plane_strain", strain="finite")
-    model.add_material(fc.NeoHookean(E=1e4, nu=0.45))
-    model.fix("BOTTOM", "xy")
+    mesh, law = fc.generate.block((2.0, 1.0), (8, 4)), fc.NeoHookean(E=1e4, nu=0.45)
+    model = made_of(mesh, "plane_strain", law, strain="finite", BOTTOM="xy")
     model.add_pressure("TOP", 500.0)
     solved, calls = newton._Newton._solve, []
 

@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, pressed_spheres, united
 from stepping import Stepping
 
 import fastcontact as fc
@@ -84,9 +84,7 @@ def check_resumed(make, ramp, relative, after=(2,), **options):
 
 def spheres(formulation="node_to_segment", **options):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation, **options)
-    return model
+    return pressed_spheres(mesh, formulation=formulation, **options)
 
 
 def boxes(formulation="node_to_segment", shift=0.02, **options):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from models import elastic_model, made_of, supported, united
+from refusals import refused
 
 import fastcontact as fc
 
@@ -183,8 +184,7 @@ def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     centre = {"plane_strain": (4.3, 13.0), "axisymmetric": (0.0, 13.0), "3d": (3.3, 4.1, 13.0)}[kinematics]
 
     def make(pushed=False, E=1000.0, nu=0.3, motion=1.0, force=1.0):
-        model = elastic_model(mesh, kinematics, E=E, nu=nu)
-        model.fix(bottom, "xyz"[:dim])
+        model = elastic_model(mesh, kinematics, E=E, nu=nu, **{bottom: "xyz"[:dim]})
         across = {} if kinematics == "axisymmetric" else {"motion": {"x": 0.1 * motion}}
         driving = {"force": {up: -60.0 * force}, **across} if pushed else {"motion": {up: -0.3 * motion}}
         ball = fc.obstacles.Sphere(centre=centre, R=8.0)
@@ -215,8 +215,7 @@ def test_sides_that_end_in_planes_of_symmetry(angle, multipliers, secondary):
         model = fc.Model(mesh, kinematics="plane_strain")
         model.add_material(fc.LinearElastic(E=E, nu=0.3), "INNER")
         model.add_material(fc.LinearElastic(E=70e3, nu=0.33), "OUTER")
-        model.prescribe("SYMMETRY_X", **{"normal" if angle else "x": 0.0})
-        model.prescribe("SYMMETRY_Y", **{"normal" if angle else "y": 0.0})
+        supported(model, SYMMETRY_X={"normal" if angle else "x": 0.0}, SYMMETRY_Y={"normal" if angle else "y": 0.0})
         model.add_pressure("BORE", 20.0 * load)
         sides = {"secondary": f"CONT_{secondary}", "primary": f"CONT_{other}"}
         options = {"clearance": clearance, "formulation": "mortar", "multipliers": multipliers}
@@ -359,11 +358,9 @@ def test_what_has_no_sensitivity_is_named():
     step = fc.solve(model, 1, criteria=TIGHT)[-1]
     tried = [(quantity, [("E", 0)], text) for quantity, text in NO_QUANTITIES]
     for quantity, by, text in [*tried, *((("pressure_max", "c"), [name], text) for name, text in NO_PARAMETERS)]:
-        with pytest.raises(fc.ModelError, match=text):
-            fc.sensitivities(model, step, quantity, by, ramp=1, criteria=TIGHT)
+        refused(fc.ModelError, text, fc.sensitivities, model, step, quantity, by, ramp=1, criteria=TIGHT)
     for options, text in NO_SUCH_CONTACT:
-        with pytest.raises(fc.ModelError, match=text):
-            asked(two_blocks(**options)())
+        refused(fc.ModelError, text, asked, two_blocks(**options)())
 
 
 def test_a_material_of_all_cells_is_named_by_a_group():
@@ -378,13 +375,11 @@ def test_other_refusals():
     with pytest.raises(fc.ModelError, match="is tied: its gaps are fixed"):
         asked(two_blocks(kind="tied")(), ("contact_force", "c", "y"), [("clearance", "c")])
     fixed = fc.Criteria(geometry_updates=2)
-    with pytest.raises(fc.ModelError, match="after a fixed number of geometry updates"):
-        asked(two_blocks()(), criteria=fixed)
+    refused(fc.ModelError, "after a fixed number of geometry updates", asked, two_blocks()(), criteria=fixed)
     varying = two_blocks()()
     varying.materials.clear()
     varying.add_material(fc.LinearElastic(E=lambda x: 1000.0 + x[:, 0], nu=0.3))
-    with pytest.raises(fc.ModelError, match="the material 0 has no constant E"):
-        asked(varying)
+    refused(fc.ModelError, "the material 0 has no constant E", asked, varying)
     model = two_blocks()()
     step = fc.solve(model, 1, criteria=TIGHT)[-1]
     model.fix("UPPER_LEFT", "x")
@@ -451,8 +446,7 @@ def test_bolts_before_and_after_their_lock():
 def test_quantities_that_cannot_be_told():
     springy = two_blocks()()
     springy.add_spring("UPPER_LEFT", x=1.0)
-    with pytest.raises(fc.ModelError, match="reactions of a model with springs"):
-        asked(springy, ("reaction", "UPPER_TOP", "y"))
+    refused(fc.ModelError, "reactions of a model with springs", asked, springy, ("reaction", "UPPER_TOP", "y"))
     mesh = fc.generate.block((10.0, 5.0), (8, 4))
     model = elastic_model(mesh, "axisymmetric", BOTTOM="xy")
     ball = fc.obstacles.Sphere(centre=(0.0, 13.0), R=8.0)

@@ -6,7 +6,7 @@ import weakref
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import pressed_spheres
 from stepping import Stepping
 
 import fastcontact as fc
@@ -15,9 +15,7 @@ from fastcontact.analysis import step_halving
 
 def spheres(formulation="node_to_segment"):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": +0.5})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
-    return model
+    return pressed_spheres(mesh, 0.5, formulation=formulation)
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")

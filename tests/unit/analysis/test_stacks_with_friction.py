@@ -24,11 +24,9 @@ def stack(element, divisions, friction=0.3, whole_sides=False):
             nodes = mesh.points_of(f"B{level}_{side}")
             held = nodes if whole_sides else nodes[np.abs(mesh.points[nodes, 2] - 0.5 * level - 0.25) < 1e-9]
             mesh = mesh.replace(point_groups={**mesh.point_groups, f"{side} {level}": held})
-    model = elastic_model(mesh, "3d", E=1.0, B0_ZMIN="xyz")
-    model.prescribe(f"B{top}_ZMAX", x=0.01, y=0.0, z=-0.01)
+    model = elastic_model(mesh, "3d", E=1.0, B0_ZMIN="xyz", **{f"B{top}_ZMAX": {"x": 0.01, "y": 0.0, "z": -0.01}})
     for level in range(1, top):
-        model.fix(f"YMIN {level}", "y")
-        model.fix(f"XMIN {level}", "x")
+        supported(model, **{f"YMIN {level}": "y", f"XMIN {level}": "x"})
     for level in range(top):
         secondary, primary = f"B{level + 1}_ZMIN", f"B{level}_ZMAX"
         options = {"formulation": "mortar", "multipliers": "dual", "friction": friction}

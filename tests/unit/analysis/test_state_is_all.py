@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model, pressed_spheres, supported
 
 import fastcontact as fc
 from fastcontact.analysis import restart
@@ -18,10 +18,7 @@ PLASTIC = fc.ElasticPlastic(E=20_000.0, nu=0.3, yield_stress=400.0, hardening=[(
 
 
 def spheres(material=ELASTIC, strain="small", **options):
-    model = made_of(fc.generate.half_spheres(size=8.0), "axisymmetric", material, strain=strain)
-    supported(model, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
-    return model
+    return pressed_spheres(fc.generate.half_spheres(size=8.0), material=material, strain=strain, **options)
 
 
 def lying_block(**options):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, pressed_spheres, supported
 from pairwise import first_of
 from stepping import Stepping
 
@@ -20,10 +20,7 @@ FEW = 3  # geometry updates: too few for the whole load, enough for a part of it
 
 def spheres(friction=0.3, **options):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
-    options = {"formulation": "node_to_segment", "friction": friction, **options}
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
-    return model
+    return pressed_spheres(mesh, **{"formulation": "node_to_segment", "friction": friction, **options})
 
 
 def analysis_of(steps=1, friction=0.3, **criteria):
@@ -217,8 +214,7 @@ def test_what_fails_inside_a_pairing_is_told_with_the_pairings_before_it(monkeyp
 def problem():
     model = fc.Model(fc.generate.block((1.0, 1.0), (1, 1)), "plane_strain", strain="finite")
     model.add_material(fc.NeoHookean(E=1.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
-    model.prescribe("TOP", y=-0.1)
+    supported(model, BOTTOM="xy", TOP={"y": -0.1})
     return prepare(model, fc.linear_ramp(2), fc.Criteria())
 
 

@@ -180,31 +180,20 @@ def test_a_rigid_surface_that_looks_away_is_refused(write, tool):
 
 MISTAKES = {
     GOOD: [
-        ('kinematics = "axisymmetric"', "kinematics = 3", r"'kinematics' must be of type str"),
         ('generator = "half-spheres"', 'generator = "half-sphere"', r"mesh.generator 'half-sphere'.*'half-spheres'"),
         ('generator = "half-spheres"\n', "", r"either the key 'file' or the key 'generator'"),
         ("size = 10.0", "sise = 10.0", r"'mesh.sise': did you mean 'mesh.size'"),
-        ("E = 20000.0\nnu = 0.3\n[[support]]", "E = 20000.0\n[[support]]", r"material\[0\] needs 'nu'"),
-        ("nu = 0.3\n[[support]]", 'nu = "0.3"\n[[support]]', r"'material\[0\].nu' must be of type int or float"),
         ("x = 0.0", "x = true", r"'support\[0\].x' must be of type"),
         ('group = "A1A2"\n', "", r"support\[0\] needs 'group'"),
         ("steps = 2", "steps = 2\ninstants = [1.0]", r"either 'instants', or 'steps'"),
         ("steps = 2", "steps = 2\ntable = [[0.0, 0.0, 1.0]]", r"list of pairs"),
         ("approach = 4.0", "approach = -4.0", r"theory.hertz"),
-        (
-            GOOD[GOOD.index("[theory") : GOOD.index("[[check")],
-            "[theory]\nhertz = 3\n",
-            r"'theory.hertz' must be a table",
-        ),
         ("E = 20000.0\nnu", "groups = [3]\nE = 20000.0\nnu", r"'material\[0\].groups' must be a list of strings or"),
         ('primary = "CONT2"', 'primary = "CONT2"\nformulation = 3', r"'contact.hertz.formulation' must be a string"),
     ],
     LOADED: [
-        ("value = 1\n", 'value = "1"\n', r"'pressure\[0\].value' must be of type int or float"),
         ("distribute = true", "distribute = 1", r"'force\[0\].distribute' must be of type bool"),
-        ("ramp = [[0, 0], [1, 1]]", "ramp = [0, 1]", r"'traction\[0\].ramp' must be a list of pairs"),
         ("ramp = [[0.0, 1.0], [1.0, 1.0]]", "ramp = [[0.0]]", r"'support\[0\].ramp' must be|'support\[1\].ramp' must"),
-        ('component = "y"', "component = 2", r"'couple\[0\].component' must be of type str"),
         ('component = "y"\n', "", r"couple\[0\] needs 'component'"),
         ('["A2", "y", 1.0]', '["A2", "y"]', r"'relation\[0\].terms' must be a list of"),
         ("[[couple]]", "[couple]", r"write \[\[couple\]\] in place of \[couple\]"),

@@ -6,6 +6,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from commands import output_of
 from pairwise import first_of
 
 import fastcontact as fc
@@ -54,8 +55,7 @@ def test_every_ready_case_passes_its_checks(name, tmp_path, monkeypatch, capsys)
 
 
 def test_the_list_names_every_case_with_what_it_is_and_checks(capsys):
-    assert main(["cases"]) == 0
-    printed = capsys.readouterr().out
+    printed = output_of(capsys, ["cases"])
     for name in NAMES:
         assert f"{name}: {tomllib.loads(ready_made_case(name).read_text())['title']}\n" in printed
     assert "axisymmetric, 3168 tri3, 20 load steps" in printed
@@ -63,20 +63,17 @@ def test_the_list_names_every_case_with_what_it_is_and_checks(capsys):
 
 
 def test_a_case_is_printed_as_it_stands(capsys):
-    assert main(["cases", "press-fit"]) == 0
-    assert capsys.readouterr().out == ready_made_case("press-fit").read_text(encoding="utf-8")
+    assert output_of(capsys, ["cases", "press-fit"]) == ready_made_case("press-fit").read_text(encoding="utf-8")
 
 
 def test_a_case_is_copied_with_its_mesh_and_runs_there(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["cases", "--copy", "forma04-no-contact", "-o", "mine.toml"]) == 0
-    assert "mine.toml, forma04a.med" in capsys.readouterr().out
+    assert "mine.toml, forma04a.med" in output_of(capsys, ["cases", "--copy", "forma04-no-contact", "-o", "mine.toml"])
     assert main(["run", "mine.toml", "-q"]) == 0
     assert main(["cases", "--copy", "press-fit"]) == 0
     assert (tmp_path / "press-fit.toml").read_text() == ready_made_case("press-fit").read_text()
     capsys.readouterr()
-    assert main(["cases", "--copy", "press-fit"]) == 1
-    assert "exists already" in capsys.readouterr().err
+    assert "exists already" in output_of(capsys, ["cases", "--copy", "press-fit"], 1)
 
 
 @pytest.mark.parametrize(
@@ -90,8 +87,7 @@ def test_a_case_is_copied_with_its_mesh_and_runs_there(tmp_path, monkeypatch, ca
     ],
 )
 def test_wrong_names_are_one_line(arguments, message, capsys):
-    assert main(arguments) == 1
-    error = capsys.readouterr().err
+    error = output_of(capsys, arguments, 1)
     assert message in error
     assert error.count("\n") == 1
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import pytest
+from commands import output_of
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -62,8 +63,7 @@ def test_no_command_replaces_what_it_reads(command, option, source, by, files, m
     elif by == "hard link":
         os.link(source, target)
     before = {path: path.read_bytes() for path in files.iterdir()}
-    assert main([*command, option, target]) == 1
-    assert f"'{target}' is an input of this command" in capsys.readouterr().err
+    assert f"'{target}' is an input of this command" in output_of(capsys, [*command, option, target], 1)
     assert {path: path.read_bytes() for path in files.iterdir()} == before
 
 
@@ -137,8 +137,7 @@ def test_an_output_that_fails_leaves_nothing(files, monkeypatch, capsys):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", fail)
-    assert main(["profile", "old.vtkhdf", "--png", "old.png"]) == 1
-    assert "No space left on device" in capsys.readouterr().err
+    assert "No space left on device" in output_of(capsys, ["profile", "old.vtkhdf", "--png", "old.png"], 1)
     assert Path("old.png").read_bytes() == b"old"
     assert sorted(os.listdir()) == names
 
@@ -148,8 +147,7 @@ def test_names_of_files_steer_no_terminal(files, monkeypatch, capsys):
     assert printable("\x1b[2Jgone\u202e\n") == "\\x1b[2Jgone\\u202e\n"
     case = files / "case.toml"
     case.write_text(case.read_text().replace('title = "', 'title = "\\u001b[31m\\u202e', 1))
-    assert main(["run", str(case), "-o", str(files / "other.vtkhdf")]) == 0
-    out = capsys.readouterr().out
+    out = output_of(capsys, ["run", str(case), "-o", str(files / "other.vtkhdf")])
     assert "\\x1b[31m\\u202e" in out
     assert "\x1b" not in out
     assert "\u202e" not in out
@@ -174,8 +172,7 @@ def test_files_of_fields_are_what_a_command_reads(text, option, files, monkeypat
     Path("heat.vtu").write_text("<VTKFile>")
     table = f'\n[[temperature]]\nfile = {text.format("heat.vtu")}\nfield = "T"\n'
     Path("case.toml").write_text(Path("case.toml").read_text() + table)
-    assert main(["run", "case.toml", option, "heat.vtu"]) == 1
-    assert "'heat.vtu' is an input of this command" in capsys.readouterr().err
+    assert "'heat.vtu' is an input of this command" in output_of(capsys, ["run", "case.toml", option, "heat.vtu"], 1)
     assert Path("heat.vtu").read_text() == "<VTKFile>"
 
 
@@ -185,8 +182,7 @@ def test_the_data_file_of_an_xdmf_mesh_is_read_too(option, files, monkeypatch, c
     Path("mesh.xdmf").write_text('<Xdmf><DataItem Format="HDF">points.h5:/p</DataItem></Xdmf>')
     Path("points.h5").write_bytes(b"points")
     Path("case.toml").write_text(Path("case.toml").read_text().replace("coarse.med", "mesh.xdmf"))
-    assert main(["run", "case.toml", option, "points.h5"]) == 1
-    assert "'points.h5' is an input of this command" in capsys.readouterr().err
+    assert "'points.h5' is an input of this command" in output_of(capsys, ["run", "case.toml", option, "points.h5"], 1)
     assert Path("points.h5").read_bytes() == b"points"
 
 
@@ -224,8 +220,7 @@ needs_full = pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="
 )
 def test_a_device_that_is_full_is_told_in_one_line(command, files, monkeypatch, capsys):
     monkeypatch.chdir(files)
-    assert main([*command.split(), "/dev/full", "-q"]) == 1
-    said = capsys.readouterr().err.splitlines()[-1]
+    said = output_of(capsys, [*command.split(), "/dev/full", "-q"], 1).splitlines()[-1]
     assert said == "error: '/dev/full' cannot be written (No space left on device): name another file"
 
 

@@ -8,6 +8,7 @@ import sys
 import matplotlib as mpl
 import pytest
 from case_texts import of_block, spheres
+from commands import output_of
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -127,13 +128,11 @@ def test_other_shells_have_scripts(shell, capsys):
 
 def test_without_the_library_it_says_what_to_install(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "shtab", None)
-    assert main(["--print-completion", "bash"]) == 1
-    assert "pip install 'fastcontact[completion]'" in capsys.readouterr().err
+    assert "pip install 'fastcontact[completion]'" in output_of(capsys, ["--print-completion", "bash"], 1)
 
 
 def test_a_shell_that_is_not_known_is_told(capsys):
-    assert main(["--print-completion", "fis"]) == 1
-    assert "fis" in capsys.readouterr().err
+    assert "fis" in output_of(capsys, ["--print-completion", "fis"], 1)
 
 
 mpl.use("Agg")
@@ -148,8 +147,7 @@ def results(solved_case, tmp_path):
 @pytest.mark.parametrize("scale", ["nan", "-inf", "1e308", "-1e40"])
 def test_a_scale_that_cannot_be_drawn(results, scale, capsys):
     picture = results.with_name("a.png")
-    assert main(["plot", str(results), f"--scale={scale}", "--png", str(picture)]) == 1
-    assert capsys.readouterr().err == (
+    assert output_of(capsys, ["plot", str(results), f"--scale={scale}", "--png", str(picture)], 1) == (
         f"error: scale = {float(scale):g} must be a finite number, and not so large that coordinates overflow\n"
     )
     assert not picture.exists()
@@ -178,8 +176,7 @@ CASE_TEXT = spheres(10.0, 1)
 def test_a_case_file_is_told(tmp_path, capsys):
     path = tmp_path / "a.toml"
     path.write_text(CASE_TEXT)
-    assert main(["info", str(path)]) == 0
-    said = capsys.readouterr().out
+    said = output_of(capsys, ["info", str(path)])
     assert "hertz" in said
     assert "CONT1" in said
 
@@ -207,7 +204,6 @@ def test_a_case_from_a_pipe_is_told(tmp_path, capsys):
 
 
 def test_warnings_take_one_line(tmp_path, capsys):
-    assert main(["mesh", "box", "-o", str(tmp_path / "a.stl")]) == 1
-    warned, refused = capsys.readouterr().err.splitlines()
+    warned, refused = output_of(capsys, ["mesh", "box", "-o", str(tmp_path / "a.stl")], 1).splitlines()
     assert warned.startswith("warning: stl files have no named groups")
     assert refused.startswith("error: ")

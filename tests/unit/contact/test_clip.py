@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.contact.formulations import _cut_faces_kernels
-from fastcontact.contact.formulations._dual_basis import LARGEST_RMS, biorthogonal, dual_functions, positive
+from fastcontact.contact.formulations._dual_basis import LARGEST_RMS, dual_functions, positive
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.mesh import elements, quadrature
@@ -263,11 +263,6 @@ def test_the_displacement_of_a_gap_is_that_of_one_node_and_of_the_ends_of_its_ed
     assert np.array_equal(np.triu(back, 1), np.zeros_like(back))
     assert np.diag(back).min() >= 1.0
     assert back.sum(axis=1) == pytest.approx(1.0, abs=1e-13)
-
-
-def test_dual_functions_of_straight_lines_are_those_of_wohlmuth():
-    dual, _ = biorthogonal(mass_over("line2", corners("line2"))[None], np.ones((1, 2), bool))
-    assert dual[0] == pytest.approx(np.array([[2.0, -1.0], [-1.0, 2.0]]), abs=1e-14)
 
 
 @pytest.mark.parametrize("name", FACETS)

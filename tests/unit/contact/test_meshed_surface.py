@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
@@ -173,16 +174,13 @@ def test_an_inconsistent_orientation_names_the_facet_to_turn():
 def test_what_is_no_surface_is_refused():
     points = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]]
     branch = fc.Mesh(points, {"line2": [[1, 0], [2, 1], [3, 1]]}, cell_groups={"B": [0, 1, 2]})
-    with pytest.raises(fc.ContactError, match=r"'B' shares an edge with more than one other facet"):
-        MeshedSurface(branch, "B")
+    refused(fc.ContactError, r"'B' shares an edge with more than one other facet", MeshedSurface, branch, "B")
     with pytest.raises(fc.ContactError, match=r"facet 0 .* has no area"):
         MeshedSurface(fc.Mesh([[0.0, 0.0], [0.0, 0.0]], {"line2": [[0, 1]]}, cell_groups={"N": [0]}), "N")
     with pytest.raises(fc.ContactError, match="contains no facets"):
         MeshedSurface(block((1.0, 1.0), (1, 1), "quad4", name="B").with_groups(cells={"E": []}), "E")
-    with pytest.raises(fc.MeshError, match="did you mean 'STRIP'"):
-        MeshedSurface(strip(), "STRIPE")
-    with pytest.raises(fc.ContactError, match="crease"):
-        MeshedSurface(strip(), "STRIP", crease=-1.0)
+    refused(fc.MeshError, "did you mean 'STRIP'", MeshedSurface, strip(), "STRIPE")
+    refused(fc.ContactError, "crease", MeshedSurface, strip(), "STRIP", crease=-1.0)
     with pytest.raises(fc.ContactError, match="has 2 dimensions, but the model 3"):
         MeshedSurface(strip(), "STRIP").distance(np.zeros((1, 3)))
 

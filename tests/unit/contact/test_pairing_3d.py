@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
@@ -134,17 +135,14 @@ def bound(kind, element="hex8", group="CONT_SPHERE", primary="hex8", **options):
 
 @pytest.mark.parametrize("element", ["tet10", "hex20"])
 def test_rules_that_make_no_sense_are_refused(element):
-    refused = r"node_to_segment cannot have facets of (tri6|quad8) .*'continuous' or 'mortar'"
-    with pytest.raises(fc.ContactError, match=f"{refused}, or swap the sides$"):
-        bound(NodeToSegment, element)
-    with pytest.raises(fc.ContactError, match=f"{refused}$"):  # the other side is quadratic, too
+    message = r"node_to_segment cannot have facets of (tri6|quad8) .*'continuous' or 'mortar'"
+    refused(fc.ContactError, f"{message}, or swap the sides$", bound, NodeToSegment, element)
+    with pytest.raises(fc.ContactError, match=f"{message}$"):  # the other side is quadratic, too
         bound(NodeToSegment, element, primary=element)
     with pytest.raises(fc.ContactError, match=r"makes no sense on facets of (tri6|quad8): .*'gauss' or 'simpson'"):
         bound(Continuous, element, integration="node")
-    with pytest.raises(fc.ContactError, match=r"n_gauss = 2 .* undetermined: use at least 3"):
-        bound(Continuous, element, n_gauss=2)
-    with pytest.raises(fc.ContactError, match=r"n_gauss = 6 is too large for triangles"):
-        bound(Continuous, "tet4", n_gauss=6)
+    refused(fc.ContactError, r"n_gauss = 2 .* undetermined: use at least 3", bound, Continuous, element, n_gauss=2)
+    refused(fc.ContactError, r"n_gauss = 6 is too large for triangles", bound, Continuous, "tet4", n_gauss=6)
 
 
 @pytest.mark.each_value

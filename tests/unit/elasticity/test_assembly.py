@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import rigid_modes, sparsity, stiffness
@@ -156,8 +157,7 @@ def test_the_loop_names_the_first_cell_that_is_inside_out(element):
     block = mesh.cells[element].copy()
     block[1:3] = block[1:3][:, elements.get(element).reversed]
     turned = mesh.replace(cells={element: block}, cell_groups={})
-    with pytest.raises(fc.MeshError, match=f"cell 1 of {element} near .* inverted"):
-        assembled(turned)
+    refused(fc.MeshError, f"cell 1 of {element} near .* inverted", assembled, turned)
 
 
 # Exact solutions -----------------------------------------------------------------------------------------------------
@@ -189,23 +189,6 @@ def test_pure_bending_is_exact_with_quadratic_cells(element):
     expected = np.zeros((mesh.n_points, 6))
     expected[:, 0] = E * curvature * mesh.points[:, 1]
     assert np.abs(step.stress - expected).max() < 1e-9 * np.abs(expected).max()
-
-
-@pytest.mark.each_value
-@pytest.mark.parametrize("linear_solver", ["direct", "amg"])
-@pytest.mark.parametrize("element", SOLIDS)
-def test_bar_in_tension_is_exact(element, linear_solver):
-    size, strain = (3.0, 1.0, 2.0), 2e-3
-    model = made_of(box(size, (3, 2, 2), element), "3d", {"BOX": fc.LinearElastic(E, NU)})
-    supported(model, XMIN="x", YMIN="y", ZMIN="z", XMAX={"x": strain * size[0]})
-    steps = fc.solve(model, fc.linear_ramp(2), linear_solver=linear_solver)
-    expected = model.mesh.points * [strain, -NU * strain, -NU * strain]
-    assert np.abs(steps[1].displacement - expected).max() < 1e-8 * strain
-    assert np.abs(steps[0].displacement - expected / 2).max() < 1e-8 * strain
-    assert np.abs(steps[1].stress - [E * strain, 0, 0, 0, 0, 0]).max() < 1e-7 * E * strain
-    assert steps[1].von_mises == pytest.approx(E * strain, rel=1e-7)
-    pulled = steps[1].reaction[model.mesh.points_of("XMAX")].sum(axis=0)
-    assert pulled == pytest.approx([E * strain * size[1] * size[2], 0, 0], abs=1e-7)
 
 
 # Element loops -------------------------------------------------------------------------------------------------------
@@ -307,11 +290,9 @@ def test_corner_volumes_are_those_of_the_cells_with_straight_edges(element):
 
 def test_six_rigid_motions_are_counted_and_named():
     model = elastic_model(box(divisions=(1, 1, 1)), "3d", E=E, nu=NU)
-    with pytest.raises(fc.ModelError, match=r"6 rigid-body motions .*'BOX'.*translation along z.*rotation about x"):
-        model.check()
+    refused(fc.ModelError, r"6 rigid-body motions .*'BOX'.*translation along z.*rotation about x", model.check)
     model.fix("XMIN", "xy")
-    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion .*translation along z"):
-        model.check()
+    refused(fc.ModelError, r"1 rigid-body motion .*translation along z", model.check)
     model.fix("XMIN", "z")
     model.check()
 
@@ -327,10 +308,8 @@ def test_cells_turned_inside_out_are_turned_back(name):
         n_turned += turned.sum()
     inside_out = mesh.replace(cells={**mesh.cells, **cells})
     assert sum((corner_measures(inside_out, kind) < 0).sum() for kind in cells) == n_turned
-    with pytest.raises(fc.MeshError, match=r"inverted"):
-        fc.Model(inside_out, "3d")
-    with pytest.raises(fc.MeshError, match=r"cell 0 of"):
-        assembled(inside_out)
+    refused(fc.MeshError, r"inverted", fc.Model, inside_out, "3d")
+    refused(fc.MeshError, r"cell 0 of", assembled, inside_out)
     back, count = oriented(inside_out)
     assert count == n_turned
     assert np.array_equal(assembled(back).toarray(), K.toarray())
@@ -345,23 +324,3 @@ def test_rigid_body_motion_needs_no_force_and_gives_no_stress(body):
         assert np.abs(K @ mode).max() < 1e-10 * np.abs(K.data).max()
         at_points = stress_at_points(kinematics, mesh, mode.reshape(-1, mesh.dim))
         assert np.abs(fc.recovery.nodal_average(mesh, at_points)).max() < 1e-10 * E
-
-
-@pytest.mark.parametrize("element", QUADRATIC)
-def test_cantilever_against_timoshenko(element):
-    length, tip = 10.0, 0.01
-    model = elastic_model(box((length, 1.0, 1.0), (10, 2, 2), element), "3d", E=E, nu=0.0, XMIN="xyz", XMAX={"z": tip})
-    (step,) = fc.solve(model, fc.linear_ramp(1))
-    # Bending and shear; shear coefficient of a rectangle 10 (1 + nu) / (12 + 11 nu) (Cowper, 1966).
-    compliance = length**3 / (3 * E / 12) + length / (5 / 6 * E / 2)
-    force = step.reaction[model.mesh.points_of("XMAX")].sum(axis=0)
-    assert force[2] == pytest.approx(tip / compliance, rel=4e-3)
-    assert force[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
-    middle = np.isclose(model.mesh.points[:, 0], 5.0)
-    bending = -6 * 2 * (model.mesh.points[middle, 2] - 0.5) * force[2] * (length - 5.0)
-    assert np.abs(step.stress[middle, 0] - bending).max() < 0.03 * np.abs(bending).max()
-
-
-def test_assembly_gives_the_same_bits_each_time():
-    mesh = patch("hex20")
-    assert np.array_equal(assembled(mesh).data, assembled(mesh).data)

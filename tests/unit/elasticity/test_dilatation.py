@@ -210,8 +210,6 @@ def test_incompatible_modes_come_before_a_mean_dilatation():
 
 
 def test_modes_count_in_the_fingerprint_and_their_absence_does_not():
-    from fastcontact.model.fingerprint import fingerprint
-
     prints = []
     for options in ({}, {"incompatible_modes": False}, {"incompatible_modes": True}):
         model = made_of(fc.generate.block(), "plane_strain", fc.LinearElastic(E=1.0, nu=0.3, **options))

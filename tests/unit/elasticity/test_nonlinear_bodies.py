@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import made_of
+from models import made_of, supported
 
 import fastcontact as fc
 from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
@@ -116,13 +116,8 @@ def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -
         assert all(np.array_equal(one, two) for one, two in zip(found[0], other, strict=True))
 
 
-def model_with(law, strain: str = "small") -> fc.Model:
-    return made_of(fc.generate.block(), "plane_strain", law, strain=strain)
-
-
 def test_initial_states_are_refused() -> None:
-    model = model_with(PLASTIC)
-    model.fix("BOTTOM", "xy")
+    model = made_of(fc.generate.block(), "plane_strain", PLASTIC, BOTTOM="xy")
     model.add_initial_stress(xx=20.0)
     with pytest.raises(fc.ModelError, match="initial stresses and strains are available for linear elasticity only"):
         fc.solve(model, 1)
@@ -131,8 +126,7 @@ def test_initial_states_are_refused() -> None:
 def test_a_body_pressed_to_nothing_says_where() -> None:
     model = fc.Model(fc.generate.block((4.0, 1.0), (4, 1)), "plane_strain", strain="finite")
     model.add_material(fc.NeoHookean(E=100.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
-    model.prescribe("TOP", x=0.0, y=-1.2)
+    supported(model, BOTTOM="xy", TOP={"x": 0.0, "y": -1.2})
     with pytest.raises(fc.ConvergenceError, match=r"cell \d of quad4 near \[.*\] is inverted .J = -"):
         fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
 

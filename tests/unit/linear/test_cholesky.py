@@ -6,8 +6,7 @@ from scipy.linalg import ldl
 from scipy.sparse import block_diag, bsr_array, csc_array, csr_array, diags_array, eye_array, kron
 
 from fastcontact.errors import ModelError
-from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation, triangular_kernels
-from fastcontact.linear.cholesky import factorisation_kernels as kernels
+from fastcontact.linear.cholesky import factorisation, triangular_kernels
 
 pytestmark = pytest.mark.pairwise
 
@@ -42,34 +41,6 @@ def filled(A):
         below = np.flatnonzero(pattern[j + 1 :, j]) + j + 1
         pattern[np.ix_(below, below)] = True
     return np.tril(pattern)
-
-
-def tree(A):
-    n = A.shape[0]
-    parent, count, position = (np.empty(n, np.intc) for _ in range(3))
-    elimination_tree_kernels.tree_and_counts(A.indptr, A.indices, parent, count)
-    elimination_tree_kernels.postordered(parent, position)
-    return parent, position, count
-
-
-@pytest.mark.parametrize("A", MATRICES)
-def test_tree_and_counts_are_those_of_elimination(A):
-    L = filled(A)
-    parent, position, count = tree(A)
-    below = [np.flatnonzero(L[j + 1 :, j]) + j + 1 for j in range(len(L))]
-    np.testing.assert_array_equal(parent, [rows[0] if len(rows) else -1 for rows in below])
-    np.testing.assert_array_equal(count, L.sum(axis=0))
-    np.testing.assert_array_equal(np.sort(position), np.arange(len(L)))
-
-
-@pytest.mark.parametrize("A", MATRICES)
-def test_subtrees_stand_together_in_postorder(A):
-    parent, place, _ = tree(A)
-    size = np.ones(len(place), int)
-    for j in np.flatnonzero(parent >= 0):  # ascending: children before parents
-        size[parent[j]] += size[j]
-    for j in np.flatnonzero(parent >= 0):
-        assert place[parent[j]] - size[parent[j]] < place[j] < place[parent[j]]
 
 
 @pytest.mark.parametrize("A", MATRICES)
@@ -161,18 +132,3 @@ def test_factors_have_the_same_bits_again():
 def test_what_is_not_positive_definite_is_refused(matrix, message):
     with pytest.raises(ModelError, match=message):
         factors(bsr_array(np.array(matrix), blocksize=(1, 1)), np.array([1]))
-
-
-@pytest.mark.parametrize("size", [1, 2, 47, 48, 49, 130])
-@pytest.mark.parametrize("share", [0.3, 1.0])
-def test_fronts_are_eliminated_as_by_hand(size, share):
-    A = positive(size, 1.0, size).toarray()
-    width = max(1, int(share * size))
-    F, expected = np.triu(A), A.copy()
-    for j in range(width):
-        row = expected[j, j + 1 :] / expected[j, j]
-        expected[j + 1 :, j + 1 :] -= np.outer(row, expected[j, j + 1 :])
-        expected[j, j + 1 :] = row
-    room = (np.empty(count * size) for count in (kernels.PANEL, kernels.PANEL, 2 * kernels.PANEL))
-    assert kernels._eliminate_columns(F, width, *room) == -1
-    np.testing.assert_allclose(np.triu(F), np.triu(expected), atol=1e-13 * np.abs(A).max())

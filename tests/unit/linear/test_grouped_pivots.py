@@ -78,31 +78,6 @@ def layered(B):
     return pivot_order.pivots_of_groups(csr_array(B), np.arange(B.shape[0]))
 
 
-def in_layers(seed, sizes=(5, 4, 3), n_others=6):
-    """Equations in shuffled order, each with an own unknown that only earlier layers contain besides."""
-    rng = np.random.default_rng(seed)
-    m = sum(sizes)
-    layer = np.repeat(np.arange(len(sizes)), sizes)
-    own = np.where(layer[:, None] < layer[None, :], 0.5 * rng.uniform(-1, 1, (m, m)), 0.0) + np.diag(
-        rng.uniform(1, 2, m)
-    )
-    others = 0.7 * rng.uniform(-1, 1, (m, n_others))
-    others[:, 0] = 0.5  # so that none of these belongs to one equation alone
-    others[:, 1:] *= rng.integers(0, 2, (1, n_others - 1))
-    B = np.hstack([own, others])
-    return B[rng.permutation(m)][:, rng.permutation(m + n_others)]
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_inverse_is_exact(seed):
-    B = in_layers(seed)
-    pivots = layered(B)
-    assert pivots is not None
-    inverse = column_inverse(csr_array(B), pivots, 1)
-    assert len(set(pivots.tolist())) == len(B)
-    assert inverse.solve(B[:, pivots]) == pytest.approx(np.eye(len(B)), abs=1e-13)
-
-
 def test_weak_unknowns_are_no_pivots():
     B = np.array([[0.1, 1.0, 0.0], [0.0, 1.0, 1.0]])
     assert layered(B).tolist() == [1, 2]

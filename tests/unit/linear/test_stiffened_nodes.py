@@ -42,16 +42,12 @@ def matrix(pivots, weights):
     return T
 
 
-def inverses(rng):
-    blocks = rng.normal(size=(OPPOSITE, SIZE, SIZE))
-    return np.linalg.inv(blocks @ blocks.transpose(0, 2, 1) + np.eye(SIZE))
-
-
 @pytest.mark.parametrize("directions", [(2,), (0, 1, 2)])
 def test_free_motions_move_no_pivot_and_yield_as_their_body_does(directions):
     rng = np.random.default_rng(3)
     elimination = equations(directions, 0.0, rng)
-    of_blocks = inverses(rng)
+    blocks = rng.normal(size=(OPPOSITE, SIZE, SIZE))
+    of_blocks = np.linalg.inv(blocks @ blocks.transpose(0, 2, 1) + np.eye(SIZE))
     motions = FreeMotions(elimination.weights, NODES, of_blocks)
     at = (NODES[:, None] * SIZE + np.arange(SIZE)).ravel()
     W, D = elimination.weights.toarray()[:, at], np.zeros((len(at), len(at)))

@@ -12,14 +12,10 @@ from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.solvers import amg
 
 
-def columns_with_friction():
-    """Continuous contact with friction, whose compliance multigrid forms from columns, a solution each."""
-    return pressed("hex20", friction=0.3, n=5, formulation="continuous", penalty=100.0)
-
-
 def test_multigrid_that_costs_more_than_factors_hands_over_in_time_and_says_at_which_work(monkeypatch):
     monkeypatch.setattr("fastcontact.linear.multigrid.solver.MOST_COLUMNS", 100_000)
-    model = columns_with_friction()
+    # The compliance of continuous contact with friction is formed from columns, a solution each.
+    model = pressed("hex20", friction=0.3, n=5, formulation="continuous", penalty=100.0)
     solver, found = solved(model, "amg")
     assert solver.counters.iterations <= solver.iteration_limit + 1 + solver.replacement.counters.iterations
     assert f"{solver.iteration_limit} iterations in one load step take longer" in solver.replacement_reason

@@ -6,6 +6,7 @@ import meshio
 import numpy as np
 import pytest
 from models import assert_same_mesh, body_of
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -93,8 +94,7 @@ def test_a_group_by_place_uses_the_facets_that_are_there():
     ],
 )
 def test_what_is_refused(call, said):
-    with pytest.raises(fc.MeshError, match=said):
-        call(bar("quad4"))
+    refused(fc.MeshError, said, call, bar("quad4"))
 
 
 def a_body(element):
@@ -156,26 +156,12 @@ def test_cells_that_nobody_knows_are_named():
         )
     with pytest.raises(fc.MeshError, match=r"meshio's mesh: .*kind polygon"):
         fc.from_meshio(meshio.Mesh(np.eye(3), [("polygon", [[0, 1, 2]])]))
-    with pytest.raises(fc.MeshError, match="no cells"):
-        fc.from_meshio(meshio.Mesh(np.eye(3), []))
+    refused(fc.MeshError, "no cells", fc.from_meshio, meshio.Mesh(np.eye(3), []))
 
 
 def test_without_gmsh_the_message_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", None)
-    with pytest.raises(fc.FileError, match=r"gmsh cannot be imported .*: pip install gmsh"):
-        fc.from_gmsh()
-
-
-@pytest.fixture
-def gmsh():
-    try:
-        import gmsh
-    except (ImportError, OSError) as error:  # it is installed, but a library of the system that it needs is not
-        pytest.skip(f"gmsh cannot be imported: {error}")
-    gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield gmsh
-    gmsh.finalize()
+    refused(fc.FileError, r"gmsh cannot be imported .*: pip install gmsh", fc.from_gmsh)
 
 
 def two_boxes(gmsh):
@@ -210,8 +196,7 @@ def test_gmsh_hands_over_physical_groups(gmsh, order):
 
 def test_gmsh_without_groups_and_with_a_body_that_has_none(gmsh):
     low, _, _ = two_boxes(gmsh)
-    with pytest.raises(fc.MeshError, match=r"has no mesh: call gmsh\.model"):
-        fc.from_gmsh()
+    refused(fc.MeshError, r"has no mesh: call gmsh\.model", fc.from_gmsh)
     gmsh.model.mesh.generate(3)
     whole = fc.from_gmsh()
     assert not whole.group_names
@@ -224,12 +209,10 @@ def test_gmsh_without_groups_and_with_a_body_that_has_none(gmsh):
 def test_gmsh_without_a_model(gmsh):
     gmsh.finalize()
     try:
-        with pytest.raises(fc.MeshError, match=r"call gmsh.initialize\(\)"):
-            fc.from_gmsh()
+        refused(fc.MeshError, r"call gmsh.initialize\(\)", fc.from_gmsh)
     finally:
         gmsh.initialize(interruptible=False)
-    with pytest.raises(fc.MeshError, match="has no mesh"):
-        fc.from_gmsh()
+    refused(fc.MeshError, "has no mesh", fc.from_gmsh)
 
 
 @pytest.mark.parametrize("element", ["tri3", "quad8", *SOLIDS])

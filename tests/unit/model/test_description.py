@@ -15,9 +15,7 @@ def blocks():
     model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), groups=["LOWER"])
     model.add_material(fc.LinearElastic(E=2000.0, nu=0.499), groups=["UPPER"])
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", y=-0.1, ramp=[(0.0, 0.0), (1.0, 1.0)])
-    return model
+    return supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"y": -0.1, "ramp": [(0.0, 0.0), (1.0, 1.0)]})
 
 
 def test_every_part_is_told():
@@ -220,8 +218,7 @@ def test_a_radial_traction_on_the_axis_goes_into_it():
 def test_a_free_block_expands_by_the_rise_over_the_reference(options, rise):
     model = fc.Model(fc.generate.block(), kinematics="plane_stress", reference_temperature=20.0)
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3, expansion=1e-5))
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    supported(model, LEFT="x", BOTTOM="y")
     model.add_temperature(80.0, **options)
     assert fc.solve(model, 1)[-1].displacement.max() == pytest.approx(1e-5 * rise, rel=1e-9)
 

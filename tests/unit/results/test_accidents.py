@@ -18,6 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from refusals import refused
 from test_result_files import MESH, assert_holds, step_result
 from test_resume import spheres
 
@@ -80,8 +81,8 @@ def test_any_write_may_fail(
     assert total > 60
     for count in range(0, total, apart):
         with monkeypatch.context() as patch:
-            refused = pytest.raises(FileError if isinstance(error, OSError) else type(error))
-            with refused as caught:
+            told = pytest.raises(FileError if isinstance(error, OSError) else type(error))
+            with told as caught:
                 write_until(path, lambda count=count, patch=patch: failing_after(count, error, patch, "_put"))
             gc.collect()  # files that nobody knows any more are closed
         with open_results(path) as results:
@@ -91,7 +92,7 @@ def test_any_write_may_fail(
         if isinstance(error, OSError):
             assert f"(Input/output error); {len(results)} steps are complete: check the disk" in str(caught.value)
         assert os.listdir(path.parent) == [path.name]
-        del caught, refused
+        del caught, told
     assert lengths == {1, 2, 3}
     with ResultWriter(path, MESH, resume=True) as out:  # now the disk is well again
         for number in range(out.n_steps, 4):
@@ -161,8 +162,7 @@ def test_what_another_program_writes_into_the_file_stays(path: Path) -> None:
 
     message = "was changed by another program after 1 steps, and its contents are left unchanged"
     for before_the_end in (False, True):
-        with pytest.raises(FileError, match=message):
-            overwritten(before_the_end)
+        refused(FileError, message, overwritten, before_the_end)
         assert path.read_bytes() == theirs
         assert_holds(path, 5)
 
@@ -340,8 +340,7 @@ def test_a_lock_that_is_a_link_changes_nothing(path: Path, link: Callable[..., N
     precious = path.with_name("precious")
     precious.write_text("precious")
     link(precious, path.with_name(f".{path.name}.lock"))
-    with pytest.raises(FileError, match="remove it"):
-        ResultWriter(path, MESH)
+    refused(FileError, "remove it", ResultWriter, path, MESH)
     assert precious.read_text() == "precious"
 
 
@@ -383,18 +382,15 @@ def record(place, count, is_new=True, data=b"\0" * 32):
 )
 def test_forged_journals(body, said, sound, tmp_path):
     path = with_journal(sound, tmp_path, body)
-    with pytest.raises(fc.FileError, match=rf"the journal at the end of '.*' {said}"):
-        fc.open_results(path)
-    with pytest.raises(fc.FileError, match=said):
-        fc.ResultWriter(path, spheres(), resume=True)
+    refused(fc.FileError, rf"the journal at the end of '.*' {said}", fc.open_results, path)
+    refused(fc.FileError, said, fc.ResultWriter, path, spheres(), resume=True)
 
 
 def test_the_same_data_hashed_for_ever(sound, tmp_path):
     size = sound.stat().st_size
     digest = hashlib.sha256(sound.read_bytes()).digest()
     path = with_journal(sound, tmp_path, record(0, size, True, digest) * 1000)
-    with pytest.raises(fc.FileError, match="counts data twice"):
-        fc.open_results(path)
+    refused(fc.FileError, "counts data twice", fc.open_results, path)
     assert len(fc.open_results(with_journal(sound, tmp_path, record(0, size, True, digest)))) == 2
 
 
@@ -406,8 +402,7 @@ def test_a_journal_of_gigabytes(sound, tmp_path):
         file.truncate(1 << 36)
         file.seek(0, os.SEEK_END)
         file.write(journal.FOOTER.pack((1 << 36) - 1000, b"\0" * 32, journal.MAGIC))
-    with pytest.raises(fc.FileError, match=r"declares 6.87e\+10 bytes"):
-        fc.open_results(path)
+    refused(fc.FileError, r"declares 6.87e\+10 bytes", fc.open_results, path)
 
 
 def test_a_long_journal_that_is_none_takes_no_memory(sound, tmp_path):
@@ -431,8 +426,7 @@ def test_files_that_lack_what_is_written_on(name, sound, tmp_path):
     shutil.copy(sound, path)
     with h5py.File(path, "r+") as file:
         del file[name]
-    with pytest.raises(fc.FileError, match=r"^(?!.*\n).*(damaged|lacks)"):
-        fc.ResultWriter(path, spheres(), resume=True)
+    refused(fc.FileError, r"^(?!.*\n).*(damaged|lacks)", fc.ResultWriter, path, spheres(), resume=True)
 
 
 def test_tables_of_another_kind(sound, tmp_path):
@@ -445,13 +439,11 @@ def test_tables_of_another_kind(sound, tmp_path):
     model = spheres()
     out = fc.ResultWriter(path, model, resume=True)
     (step,) = fc.solve(model, RAMP, resume=out.done)[2:]
-    with pytest.raises(fc.FileError, match="its tables are damaged: name another file"):
-        out.write(step)
+    refused(fc.FileError, "its tables are damaged: name another file", out.write, step)
 
 
 @pytest.mark.parametrize("lost", ["case", "pairs", "numbers", "solver", "active", "obstacles"])
 def test_restart_data_that_lack_a_part(lost, sound):
     last = fc.open_results(sound)[-1]
     del last.restart[lost]
-    with pytest.raises(fc.ModelError, match=r"the restart data of step 2 are damaged"):
-        fc.solve(spheres(), RAMP, resume=[last])
+    refused(fc.ModelError, r"the restart data of step 2 are damaged", fc.solve, spheres(), RAMP, resume=[last])

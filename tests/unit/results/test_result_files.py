@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.errors import FileError, ModelError
@@ -432,8 +433,7 @@ def test_an_old_file_stays_until_the_new_one_is_begun(path: Path, monkeypatch: p
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("fastcontact.results.write_arrays.write_case", fail)
-    with pytest.raises(FileError, match=r"cannot be written \(No space left on device\)"):
-        ResultWriter(path, MESH)
+    refused(FileError, r"cannot be written \(No space left on device\)", ResultWriter, path, MESH)
     assert path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]
 
@@ -449,13 +449,11 @@ def test_an_open_old_file_can_still_be_read_when_a_new_one_takes_its_place(path:
 def test_a_second_writer_is_refused_and_damages_nothing(path: Path) -> None:
     with ResultWriter(path, MESH) as out:
         out.write(step_result(0))
-        with pytest.raises(FileError, match=f"is being written by process {os.getpid()}: wait for it"):
-            ResultWriter(path, MESH)
+        refused(FileError, f"is being written by process {os.getpid()}: wait for it", ResultWriter, path, MESH)
         link = path.with_name("link.vtkhdf")
         link.symlink_to(path)
-        with pytest.raises(FileError, match="is being written"):
-            ResultWriter(link, MESH)
-        code = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_result_files as t; "
+        refused(FileError, "is being written", ResultWriter, link, MESH)
+        code = f"import sys; sys.path[:0] = {sys.path!r}; import test_result_files as t; "
         code += f"t.ResultWriter({str(path)!r}, t.MESH)"
         other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert f"is being written by process {os.getpid()}" in other.stderr.splitlines()[-1]
@@ -485,8 +483,7 @@ def test_a_file_put_in_the_place_of_the_running_one_is_not_touched(path: Path) -
         out.write(step_result(0))
         path.unlink()
         path.write_text("mine")
-        with pytest.raises(FileError, match=r"is no longer there: .* after 1 steps\. Put it back and resume"):
-            out.write(step_result(1))
+        refused(FileError, r"is no longer there: .* after 1 steps\. Put it back and resume", out.write, step_result(1))
     assert path.read_text() == "mine"
 
 
@@ -537,8 +534,7 @@ def test_protected_folders_and_files() -> None:
 
 def test_files_that_must_not_be_replaced(tmp_path: Path, path: Path) -> None:
     before = write(path).read_bytes()
-    with pytest.raises(FileError, match=r"exists already: name another file"):
-        ResultWriter(path, MESH, overwrite=False)
+    refused(FileError, r"exists already: name another file", ResultWriter, path, MESH, overwrite=False)
     assert path.read_bytes() == before
     ResultWriter(tmp_path / "new.vtkhdf", MESH, overwrite=False).close()
     case, mesh = tmp_path / "case.toml", tmp_path / "mesh.med"
@@ -546,8 +542,7 @@ def test_files_that_must_not_be_replaced(tmp_path: Path, path: Path) -> None:
     h5py.File(mesh, "w").create_group("ENS_MAA").file.close()
     for foreign in (case, mesh):
         before = foreign.read_bytes()
-        with pytest.raises(FileError, match="exists and is not a result file"):
-            ResultWriter(foreign, MESH)
+        refused(FileError, "exists and is not a result file", ResultWriter, foreign, MESH)
         assert foreign.read_bytes() == before
     path.write_bytes(b"")  # a name that tempfile has made
     assert len(fc.open_results(write(path, 1))) == 1
@@ -568,12 +563,10 @@ def test_steps_that_do_not_fit(path: Path) -> None:
     }
     with ResultWriter(path, MESH) as out:
         for message, change in bad.items():
-            with pytest.raises(FileError, match=message):
-                out.write(dataclasses.replace(good, **change))
+            refused(FileError, message, out.write, dataclasses.replace(good, **change))
         out.write(good)
     assert_same(fc.open_results(path)[0], good)
-    with pytest.raises(FileError, match="is closed"):
-        out.write(good)
+    refused(FileError, "is closed", out.write, good)
     out.close()  # a second close does nothing
     with pytest.raises(ModelError, match="needs a mesh or a model, not str"):
         ResultWriter(path, "mesh.med")  # type: ignore[arg-type]
@@ -586,16 +579,14 @@ def test_a_file_from_the_future(path: Path) -> None:
     write(path)
     with h5py.File(path, "r+") as file:
         file["fastcontact"].attrs.modify("schema", 7)
-    with pytest.raises(FileError, match="has schema 7, but this version reads schemas up to 4: update it"):
-        fc.open_results(path)
+    refused(FileError, "has schema 7, but this version reads schemas up to 4: update it", fc.open_results, path)
 
 
 def test_truncated_files_say_so(path: Path) -> None:
     whole = write(path).read_bytes()
     for part in (0.02, 0.3, 0.6, 0.9, 0.999):
         path.write_bytes(whole[: int(part * len(whole))])
-        with pytest.raises(FileError, match=r"truncated or damaged|is not an HDF5 file"):
-            fc.open_results(path)
+        refused(FileError, r"truncated or damaged|is not an HDF5 file", fc.open_results, path)
 
 
 def test_damage_inside_is_told_and_never_read_as_data(path: Path) -> None:
@@ -609,8 +600,7 @@ def test_damage_inside_is_told_and_never_read_as_data(path: Path) -> None:
             fc.open_results(damaged)[2]
     with h5py.File(path, "r+") as file:
         del file["fastcontact/mesh/cells"]
-    with pytest.raises(FileError, match="truncated or damaged"):
-        fc.open_results(path)
+    refused(FileError, "truncated or damaged", fc.open_results, path)
 
 
 def test_forces_on_the_primary_side_that_are_cut_off(path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from models import supported
+from refusals import refused
 from test_result_files import MESH, assert_holds, assert_same, nth_step, step_result
 
 import fastcontact as fc
@@ -248,8 +249,7 @@ def test_another_case_is_refused_and_changes_nothing(name: str, path: Path) -> N
     begun(path, (0.5,))
     before = path.read_bytes()
     model, ramp, message = other_cases()[name]
-    with pytest.raises(ModelError, match=rf"belong to another case; changed since: {message}\. Continue"):
-        resumed(path, ramp, model)
+    refused(ModelError, rf"belong to another case; changed since: {message}\. Continue", resumed, path, ramp, model)
     assert path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]
 
@@ -267,8 +267,7 @@ def test_a_pair_that_named_no_formulation_is_told_which_one_it_had(options: dict
     """Defaults change from version to version; the steps so far are those of another one."""
     begun(path, (0.5,), formulated(**options))
     told = rf"changed since: contact 'hertz'\. .* \(contact 'hertz' had {message}: specify this formulation\)"
-    with pytest.raises(ModelError, match=told):
-        resumed(path, fc.linear_ramp(2), formulated())
+    refused(ModelError, told, resumed, path, fc.linear_ramp(2), formulated())
     assert len(resumed(path, fc.linear_ramp(2), formulated(**options))) == 2
 
 
@@ -308,8 +307,7 @@ def test_steps_without_their_state_are_refused(path: Path) -> None:
 
 def test_what_is_no_result_is_not_resumed(path: Path) -> None:
     path.write_text("mine")
-    with pytest.raises(FileError, match="is not an HDF5 file"):
-        ResultWriter(path, MESH, resume=True)
+    refused(FileError, "is not an HDF5 file", ResultWriter, path, MESH, resume=True)
     assert path.read_text() == "mine"
     assert os.listdir(path.parent) == [path.name]
 
@@ -327,8 +325,8 @@ def test_a_folder_that_vanishes_is_told_at_the_next_step(tmp_path: Path) -> None
         folder.rename(tmp_path / "there")
 
     message = r"is no longer there: .*, moved or replaced after 1 steps\. Put it back and resume"
-    refused = pytest.raises(FileError, match=message)
-    with refused, ResultWriter(folder / "run.vtkhdf", model) as out:
+    told = pytest.raises(FileError, match=message)
+    with told, ResultWriter(folder / "run.vtkhdf", model) as out:
         fc.solve(model, fc.linear_ramp(3), on_step=on_step)
     moved = tmp_path / "there" / "run.vtkhdf"
     results = open_results(moved)
@@ -366,8 +364,7 @@ def test_damaged_packed_data_are_noticed() -> None:
     for size in (0, 10, len(raw) - 1):
         with pytest.raises((ValueError, LookupError, TypeError)):
             unpack(raw[:size])
-    with pytest.raises(ValueError, match="is not a packed array"):
-        unpack(pack({"a": np.array(["text"])}))
+    refused(ValueError, "is not a packed array", unpack, pack({"a": np.array(["text"])}))
 
 
 def test_a_damaged_state_is_no_state(path: Path) -> None:
@@ -377,8 +374,7 @@ def test_a_damaged_state_is_no_state(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["fastcontact/restart0"][50] ^= 255
     assert open_results(path)[-1].restart is None
-    with pytest.raises(ModelError, match="does not contain restart data"):
-        resumed(path, fc.linear_ramp(2))
+    refused(ModelError, "does not contain restart data", resumed, path, fc.linear_ramp(2))
 
 
 @pytest.mark.parametrize("synchronise", [pytest.param(False, marks=pytest.mark.slow), True])

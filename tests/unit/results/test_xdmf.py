@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from test_node_order import SOLIDS, row_of
 from test_result_files import CELL_DATA, MESH, ResultWriter, expected_point_data, step_result, write
 
@@ -119,8 +120,7 @@ def test_vtk_reads_every_step_through_it(sidecar: Path) -> None:
 def test_one_written_during_the_run_stays_right(tmp_path: Path) -> None:
     path, sidecar = tmp_path / "result.vtkhdf", tmp_path / "result.xdmf"
     with ResultWriter(path, MESH) as out:
-        with pytest.raises(FileError, match="contains no complete step yet"):
-            write_xdmf(path, sidecar)
+        refused(FileError, "contains no complete step yet", write_xdmf, path, sidecar)
         out.write(step_result(0))
         write_xdmf(path, sidecar)
         out.write(step_result(1))
@@ -133,10 +133,8 @@ def test_one_written_during_the_run_stays_right(tmp_path: Path) -> None:
 
 def test_what_cannot_be_exported(tmp_path: Path) -> None:
     path = write(tmp_path / "result.vtkhdf", 1)
-    with pytest.raises(FileError, match="does not exist"):
-        write_xdmf(tmp_path / "missing.vtkhdf", tmp_path / "a.xdmf")
-    with pytest.raises(FileError, match=r"folder '.*' does not exist"):
-        write_xdmf(path, tmp_path / "nowhere" / "a.xdmf")
+    refused(FileError, "does not exist", write_xdmf, tmp_path / "missing.vtkhdf", tmp_path / "a.xdmf")
+    refused(FileError, r"folder '.*' does not exist", write_xdmf, path, tmp_path / "nowhere" / "a.xdmf")
     for name in ("a:b.vtkhdf", "é.vtkhdf"):
         path = path.rename(tmp_path / name)
         with pytest.raises(FileError, match=rf"XDMF readers cannot open '{name}': use a name in ASCII without colons"):
@@ -349,10 +347,8 @@ def test_without_names_there_is_no_legend(tmp_path: Path) -> None:
 
 
 def test_messages(tmp_path: Path) -> None:
-    with pytest.raises(CaseError, match=r"curve 'a': x has shape \(2,\) and y \(3,\)"):
-        Curve([1, 2], [1, 2, 3], "a")
-    with pytest.raises(CaseError, match="unknown curve style 'lines': did you mean 'line'"):
-        Curve([1], [1], "a", "lines")
+    refused(CaseError, r"curve 'a': x has shape \(2,\) and y \(3,\)", Curve, [1, 2], [1, 2, 3], "a")
+    refused(CaseError, "unknown curve style 'lines': did you mean 'line'", Curve, [1], [1], "a", "lines")
     with pytest.raises(CaseError, match="none of the 1 curves has a finite point"):
         write_agr(tmp_path / "a.agr", [Curve([np.nan], [1.0])], **LABELS)
     with pytest.raises(FileError, match="does not exist: create it"):

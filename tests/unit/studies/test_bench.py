@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import output_of
 
 from fastcontact.cli import main
 from fastcontact.cli.bench import suite
@@ -25,8 +26,7 @@ def test_all_subjects_are_there():
 
 def test_the_table_of_robustness(tmp_path, capsys):
     path = tmp_path / "run.json"
-    assert main(["bench", "robustness", "--smallest", "--json", str(path)]) == 0
-    head, *lines = capsys.readouterr().out.splitlines()
+    head, *lines = output_of(capsys, ["bench", "robustness", "--smallest", "--json", str(path)]).splitlines()
     rows = json.loads(path.read_text())["tables"]["robustness"]
     assert len(lines) == len(rows) == 2
     assert head.split()[-3:] == ["L", "residual", "solver"]
@@ -40,8 +40,7 @@ def test_the_table_of_robustness(tmp_path, capsys):
 @pytest.mark.slow
 def test_the_table_of_threads(tmp_path, capsys):
     path = tmp_path / "run.json"
-    assert main(["bench", "threads", "--smallest", "--json", str(path)]) == 0
-    assert "serial part by Amdahl's law" in capsys.readouterr().out
+    assert "serial part by Amdahl's law" in output_of(capsys, ["bench", "threads", "--smallest", "--json", str(path)])
     (entry,) = json.loads(path.read_text())["tables"]["threads"]
     one, two = entry["runs"]
     assert (one["threads"], two["threads"]) == (1, 2)
@@ -68,8 +67,7 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
 def test_comparison_with_a_stored_run(tmp_path, capsys):
     path = str(tmp_path / "run.json")
     main(["bench", "search", "--smallest", "--json", path])
-    assert main(["bench", "search", "--smallest", "--compare", path]) == 0
-    assert "to stored" in capsys.readouterr().out
+    assert "to stored" in output_of(capsys, ["bench", "search", "--smallest", "--compare", path])
 
 
 @pytest.mark.parametrize(
@@ -83,8 +81,7 @@ def test_comparison_with_a_stored_run(tmp_path, capsys):
     ],
 )
 def test_wrong_words_get_one_line(words, text, capsys):
-    assert main(["bench", *words]) == 1
-    assert text in capsys.readouterr().err
+    assert text in output_of(capsys, ["bench", *words], 1)
 
 
 FOLDER = Path(__file__).resolve().parents[3] / "bench" / "peers"

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -169,8 +170,7 @@ def test_values_that_are_no_numbers_have_no_curve(case):
     ],
 )
 def test_what_is_wrong_is_told_before_anything_runs(case, parameters, words):
-    with pytest.raises(fc.CaseError, match=words):
-        fc.parameter_sweep(case, parameters, workers=1)
+    refused(fc.CaseError, words, fc.parameter_sweep, case, parameters, workers=1)
 
 
 @pytest.mark.parametrize(
@@ -188,10 +188,8 @@ def test_what_is_wrong_in_the_study_is_told_by_every_command(case, entry, words,
         "[study]", f"[study]\n{entry}"
     )
     (tmp_path / "case.toml").write_text(re.sub(r"(?ms)^\[study\.(?=parameters|options).*?(?=^\[|\Z)", "", text))
-    with pytest.raises(fc.CaseError, match=words):
-        fc.parameter_sweep(tmp_path / "case.toml", {"approach": (0.4,)}, level=0, workers=1)
-    with pytest.raises(fc.CaseError, match=words):
-        fc.convergence_study(tmp_path / "case.toml", 1, workers=1)
+    refused(fc.CaseError, words, fc.parameter_sweep, tmp_path / "case.toml", {"approach": (0.4,)}, level=0, workers=1)
+    refused(fc.CaseError, words, fc.convergence_study, tmp_path / "case.toml", 1, workers=1)
 
 
 def test_quantities_of_the_study_are_in_the_table(case, tmp_path):

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of
+from refusals import refused
 from test_refusals import FLAT, SPRING, before, in_parts
 from test_temperatures import TIED, heated
 from test_tightening import BAR, HELD, TIGHT, cooled
@@ -43,10 +44,8 @@ def test_notes_tell_of_output_and_of_controls_by_themselves(tmp_path, asked):
 
 
 def test_a_deck_that_is_not_there(tmp_path):
-    with pytest.raises(fc.FileError, match=r"none\.inp"):
-        fc.read_deck(tmp_path / "none.inp")
-    with pytest.raises(fc.FileError, match="is a folder: name a file in it"):
-        fc.read_deck(tmp_path)
+    refused(fc.FileError, r"none\.inp", fc.read_deck, tmp_path / "none.inp")
+    refused(fc.FileError, "is a folder: name a file in it", fc.read_deck, tmp_path)
 
 
 def test_a_file_that_is_lost_while_the_deck_is_read(tmp_path, monkeypatch):
@@ -55,8 +54,7 @@ def test_a_file_that_is_lost_while_the_deck_is_read(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "read_bytes", lost)
     (tmp_path / "deck.inp").write_bytes(WHOLE.encode())
-    with pytest.raises(fc.FileError, match=r"cannot read '.*deck\.inp': Input/output error"):
-        fc.read_deck(tmp_path / "deck.inp")
+    refused(fc.FileError, r"cannot read '.*deck\.inp': Input/output error", fc.read_deck, tmp_path / "deck.inp")
 
 
 CYLINDRICAL = """*Orientation, name=round, system=CYLINDRICAL
@@ -175,8 +173,7 @@ GAPS = """*Node
 def test_gap_elements_that_are_no_plane_at_rest(tmp_path, change, said):
     held = "bottom, 3\n" if "fixed" in said else "bottom, 3\nceiling, 1, 3\n"
     text = before("*Boundary\n", GAPS).replace(*change).replace("bottom, 3\n", held)
-    with pytest.raises(fc.CaseError, match=said):
-        deck_of(tmp_path, text)
+    refused(fc.CaseError, said, deck_of, tmp_path, text)
 
 
 @pytest.mark.filterwarnings("ignore:nothing determines the position of bodies")
@@ -426,5 +423,4 @@ def test_frequencies_about_the_last_step(tmp_path, capsys):
         (text + FREQUENCY.replace(" 2\n", " 0\n"), "the number of modes must be at least 1"),
         (text + FREQUENCY.replace(" 2\n", " 2\n*Static\n"), r"either \*STATIC or one"),
     ):
-        with pytest.raises(fc.CaseError, match=said):
-            deck_of(tmp_path, wrong)
+        refused(fc.CaseError, said, deck_of, tmp_path, wrong)

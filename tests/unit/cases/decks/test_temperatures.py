@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from deck_text import STEP, WHOLE, deck_of
+from refusals import refused
 
 import fastcontact as fc
 
@@ -123,8 +124,7 @@ def test_expansion_without_temperatures_is_noted(tmp_path):
     ],
 )
 def test_what_is_refused(tmp_path, text, said):
-    with pytest.raises(fc.CaseError, match=said):
-        deck_of(tmp_path, text)
+    refused(fc.CaseError, said, deck_of, tmp_path, text)
 
 
 REST = STEP.replace("100.", "0.")
@@ -194,15 +194,13 @@ def test_in_the_plane_there_are_four_components(tmp_path):
     ],
 )
 def test_initial_stresses_that_are_refused(tmp_path, lines, words):
-    with pytest.raises(fc.CaseError, match=words):
-        deck_of(tmp_path, stressed(lines))
+    refused(fc.CaseError, words, deck_of, tmp_path, stressed(lines))
 
 
 def test_axes_of_a_material_and_other_types_are_refused(tmp_path):
     turned = "*Orientation, name=o\n0., 1., 0., -1., 0., 0.\n*Solid Section, elset=low, orientation=o,"
     text = stressed("low, 20., 0., 0., 0., 0., 0.\n", ("*Solid Section, elset=low,", turned))
-    with pytest.raises(fc.CaseError, match=r"element 1 has an \*ORIENTATION"):
-        deck_of(tmp_path, text)
+    refused(fc.CaseError, r"element 1 has an \*ORIENTATION", deck_of, tmp_path, text)
     with pytest.raises(fc.CaseError, match="TYPE=VELOCITY is not supported, only TEMPERATURE and STRESS"):
         deck_of(tmp_path, stressed("low, 1.\n", ("type=STRESS", "type=VELOCITY")))
     with pytest.raises(fc.CaseError, match="GEOSTATIC"):
