@@ -92,7 +92,7 @@ def contact_result(
     forces, total, primary_points, primary_forces = _nodal_forces(pair, constraints, multiplier, tangential)
     finite_normal = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
-    place, tangent = middle.places(constraints.positions), middle.tangent
+    place, tangent = middle.distances(constraints.positions), middle.tangent
     along_tangent = place if tangent is None else (constraints.positions - middle.position) @ tangent
     dry = None if pair.options.source is None else np.zeros(len(points))
     abscissa, obstacle_results = pair.secondary.abscissa, dict[str, Any]()
@@ -122,7 +122,7 @@ def contact_result(
         shear=shear,
         sticking=closed & sticking,
         middle=middle.position,
-        place=middle.places(coordinates),
+        place=middle.distances(coordinates),
         tangent=tangent,
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
@@ -141,7 +141,7 @@ def _contact_radius(
     """
     low, high = half_width(distances[0], active, distances[1])
     side = pair.secondary
-    place = middle.places(pair.points[side.points])
+    place = middle.distances(pair.points[side.points])
     if pair.points.shape[1] == 3 and closed[place.argmin()]:  # not a ring around an open middle
         free = ~closed & ~pair.excluded[side.points]
         low = min(low, float(place[closed & (side.beside @ free > 0)].min(initial=np.inf)))

@@ -43,7 +43,7 @@ class CohesiveLaw:
         largest of these ratios is one.
     mixed_mode : str
         Fracture energy in mixed mode: ``"bk"`` for the interpolation of Benzeggagh and Kenane, or ``"power"`` for the power
-        law, in which powers of the energies over their limits sum to one.
+        law, in which powers of the ratios of the energies to their limits sum to one.
     """
 
     strength: float
@@ -79,7 +79,7 @@ class CohesiveLaw:
         return onset, 2.0 * energy / (self.stiffness * onset)
 
     def damage(self, opening: Array, sliding: Array, previous: Array) -> Array:
-        """Return the damage (m,) [-] at openings and slidings (m,) [length].
+        """Return the damage (m,) [-] at normal and tangential separations `opening` and `sliding` (m,) [length].
 
         Unless the law is reversible, the damage is at least `previous` (m,).
         """

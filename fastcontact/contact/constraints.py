@@ -294,7 +294,7 @@ class Constraints:
         """Areas (m,), zero for constraints that have no area or cannot carry forces [area]."""
         return np.zeros(len(self)) if self.areas is None else np.where(np.isfinite(self.areas), self.areas, 0.0)
 
-    def moved_past(self, rows: Indices, Q: csr_array | None) -> Mask:
+    def imposes_slip(self, rows: Indices, Q: csr_array | None) -> Mask:
         """Return whether supports or obstacles impose a slip along each tangent (k, q) of the constraints `rows` (q,).
 
         The tangents are rotated by Q ((1 + k) q, (1 + k) q) if it is given, see `cone_newton.aligning_rotation`.

@@ -111,8 +111,8 @@ class ContactMiddle:
     ignored : tuple of ndarray (dim,)
         Unit vectors along which the model represents an infinite surface [-].
     tangent : ndarray (dim,), optional
-        Direction along which half-widths are measured [-]. If None, half-widths are measured by `places`: for a middle on the
-        axis, in 3D, and on a ring that is in contact along its complete circumference.
+        Direction along which half-widths are measured [-]. If None, half-widths are measured by `distances`: for a middle on
+        the axis, in 3D, and on a ring that is in contact along its complete circumference.
     """
 
     position: Array
@@ -123,7 +123,7 @@ class ContactMiddle:
     ignored: tuple[Array, ...] = ()
     tangent: Array | None = None
 
-    def places(self, positions: Array) -> Array:
+    def distances(self, positions: Array) -> Array:
         """Return the distances (n,) of reference positions (n, dim) from the middle, signed along a line [length]."""
         if self.line is not None:
             arc_length = self.line.lengths(positions) - self.start

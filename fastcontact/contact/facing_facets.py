@@ -63,12 +63,12 @@ class OuterFacets:
         facet, point, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
             element = elements.get(name)
-            inside = element.nodes + INSET * (element.nodes.mean(axis=0) - element.nodes)
-            xi = np.concatenate([element.quadrature[0], inside])  # facets may overlap only by a narrow strip
+            inset_nodes = element.nodes + INSET * (element.nodes.mean(axis=0) - element.nodes)
+            xi = np.concatenate([element.quadrature[0], inset_nodes])  # facets may overlap only by a narrow strip
             shape, gradient = element.shape(xi), element.gradient(xi)
-            corners = self.mesh.points[facets]
-            point.append((shape @ corners).reshape(-1, self.mesh.dim))
-            normal.append(area_vectors(corners, gradient).reshape(-1, self.mesh.dim))
+            nodes = self.mesh.points[facets]
+            point.append((shape @ nodes).reshape(-1, self.mesh.dim))
+            normal.append(area_vectors(nodes, gradient).reshape(-1, self.mesh.dim))
             facet.append(np.repeat(first + np.arange(len(facets)), len(shape)))
         normals = np.concatenate(normal)
         return np.concatenate(facet), np.concatenate(point), normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -96,8 +96,8 @@ class OuterFacets:
     @cached_property
     def boxes(self) -> tuple[Array, Array]:
         """Lower and upper corners (n, dim) of the bounding boxes of the nodes of each facet [length]."""
-        corners = [self.mesh.points[facets] for facets in self.blocks.values()]
-        return np.concatenate([c.min(axis=1) for c in corners]), np.concatenate([c.max(axis=1) for c in corners])
+        nodes = [self.mesh.points[facets] for facets in self.blocks.values()]
+        return np.concatenate([c.min(axis=1) for c in nodes]), np.concatenate([c.max(axis=1) for c in nodes])
 
     @cached_property
     def smooth_face(self) -> Indices:
@@ -188,8 +188,8 @@ def _facing_of_body(
         candidates = candidates[((position >= begin) & (position <= end)).all(axis=1)]
     if not others.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
-    kinds = facets.facets(np.flatnonzero(others)).values()
-    closest = closest_of_kinds(point[candidates], [facets.mesh.points[block] for block in kinds])
+    facets_by_type = facets.facets(np.flatnonzero(others)).values()
+    closest = closest_of_kinds(point[candidates], [facets.mesh.points[block] for block in facets_by_type])
     facet, opposite = facet_of_point[candidates], np.flatnonzero(others)[closest.facet]
     difference = point[candidates] - closest.position
     gap = np.einsum("nd,nd->n", difference, closest.normal)

@@ -84,9 +84,9 @@ class AreaVectors:
             N, dN = element.shape(xi), element.gradient(xi)
             measure = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric)
             np.add.at(areas, block.local, (measure * weights) @ N**2)
-            corners = (self.points + displacement)[block.facets]
+            positions = (self.points + displacement)[block.facets]
             by_facet, derivative = weighted_area_vectors(
-                corners, N, dN, np.broadcast_to(weights, measure.shape), N**2, self.axisymmetric
+                positions, N, dN, np.broadcast_to(weights, measure.shape), N**2, self.axisymmetric
             )
             np.add.at(vectors, block.local, by_facet)
             rows, columns = (

@@ -123,10 +123,10 @@ def deflate(projectors: Array, vectors: Array, threshold: Array | float) -> Arra
 
     Vectors whose projection is shorter than `threshold` are ignored.
     """
-    inside = np.einsum("nde,ne->nd", projectors, vectors)
-    length = np.linalg.norm(inside, axis=1, keepdims=True)
-    inside = np.where(length > threshold, inside / np.where(length > 0.0, length, 1.0), 0.0)
-    return projectors - inside[:, :, None] * inside[:, None, :]
+    projected = np.einsum("nde,ne->nd", projectors, vectors)
+    length = np.linalg.norm(projected, axis=1, keepdims=True)
+    projected = np.where(length > threshold, projected / np.where(length > 0.0, length, 1.0), 0.0)
+    return projectors - projected[:, :, None] * projected[:, None, :]
 
 
 def direction_fields(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:

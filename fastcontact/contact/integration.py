@@ -23,15 +23,15 @@ def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisy
     of all points of the mesh [length]. In axisymmetric models the circumference is included.
     """
     reference = elements.get(element)
-    corners = points[facets]
-    measure = np.linalg.norm(area_vectors(corners, reference.gradient(xi)), axis=2)
+    nodes = points[facets]
+    measure = np.linalg.norm(area_vectors(nodes, reference.gradient(xi)), axis=2)
     if axisymmetric:
-        measure = measure * (2 * np.pi * np.einsum("qk,fk->fq", reference.shape(xi), corners[:, :, 0]))
+        measure = measure * (2 * np.pi * np.einsum("qk,fk->fq", reference.shape(xi), nodes[:, :, 0]))
     return measure
 
 
 def gauss_rule(element: str, n: int) -> quadrature.Rule:
-    """Return the Gauss rule of a facet with `n` points in each direction, which is exact for degree 2n - 1.
+    """Return the Gauss rule of a facet with `n` points in each direction, which is exact for polynomials of degree 2n - 1.
 
     On triangles it is a symmetric rule of degree 2n - 2.
 
@@ -93,11 +93,10 @@ def even_at_axis(surface: Surface, points: Array) -> csr_array:
 
     If the end of a quadratic line lies on the axis, the integral of its shape function vanishes. The force of this node
     hardly depends on the value p there: divided by the area of the facet, the force is a 60th of the difference between p and
-    the value at the other end. Errors of forces would be amplified accordingly. A smooth field is an even function of the
-    radius r. Therefore p follows from the values p1 and p2 at the radii r1 and r2 of the two other nodes, as
-    (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2). `points`
-    (n_points, dim) are the coordinates of all points [length]; the column of an end is empty, and all other nodes keep their
-    values.
+    the value at the other end. Errors in the forces would be amplified accordingly. A smooth field is an even function of the
+    radius r. Therefore p = (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2), with the values p1 and p2 at the radii r1 and r2 of the two
+    other nodes. `points` (n_points, dim) are the coordinates of all points [length]. The column of an end is empty, and all
+    other nodes keep their values.
     """
     values = eye_array(len(surface.points), format="lil")
     for block in surface.blocks:

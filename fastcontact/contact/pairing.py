@@ -52,7 +52,7 @@ class Candidates:
     shape : ndarray (n, k)
         Weight of each node, the value of its shape function [-].
     facet : ndarray of int (n,), optional
-        Number of the secondary facet on which each candidate lies; facets are numbered through all blocks.
+        Number of the secondary facet on which each candidate lies; facets are numbered consecutively through all blocks.
     xi : ndarray (n, dim - 1), optional
         Reference coordinates of each candidate in its facet [-].
     """
@@ -110,7 +110,7 @@ class Pairing:
     Attributes
     ----------
     facet : ndarray of int (n,)
-        Number of the opposite primary facet; facets are numbered through all blocks.
+        Number of the opposite primary facet; facets are numbered consecutively through all blocks.
     xi : ndarray (n, dim - 1)
         Reference coordinates of the projection in this facet [-].
     normal : ndarray (n, dim)
@@ -182,7 +182,7 @@ def pair(
         _, normal, paired, offset = primary.facing(candidates, pose)
         no_facet = np.zeros(len(candidates), np.intp)
         return Pairing(no_facet, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
-    closest = closest_of_kinds(candidates, primary.corners(coordinates))
+    closest = closest_of_kinds(candidates, primary.node_positions(coordinates))
     if normals == "facet" and not rounded:
         at_smooth_end = _at_smooth_ends(primary, coordinates, closest)
         paired = closest.overhang <= np.where(at_smooth_end, max(projection_tolerance, OVERHANG), projection_tolerance)
@@ -235,11 +235,11 @@ def _with_overhang(
     if not len(rows):
         return pairing
     feet = places(primary, pairing.facet[rows], pairing.xi[rows])
-    corners = coordinates[feet.nodes]
-    offset = candidates[rows] - np.einsum("nk,nkd->nd", feet.shape, corners)
-    axes = np.concatenate([np.einsum("nkj,nkd->ndj", feet.gradient, corners), pairing.normal[rows][:, :, None]], axis=2)
+    nodes = coordinates[feet.nodes]
+    offset = candidates[rows] - np.einsum("nk,nkd->nd", feet.shape, nodes)
+    basis = np.concatenate([np.einsum("nkj,nkd->ndj", feet.gradient, nodes), pairing.normal[rows][:, :, None]], axis=2)
     beyond = np.zeros_like(pairing.xi)
-    beyond[rows] = np.linalg.solve(axes, offset[:, :, None])[:, :-1, 0]
+    beyond[rows] = np.linalg.solve(basis, offset[:, :, None])[:, :-1, 0]
     return replace(pairing, beyond=beyond)
 
 

@@ -26,14 +26,15 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Adjacent facets whose normals enclose a smaller angle approximate a smooth surface; others form a corner [degrees]. The
-# value lies between the exterior angles of octagons and heptagons, so that regular polygons do not depend on round-off.
+# Adjacent facets whose normals enclose a smaller angle [degrees] approximate a smooth surface; others form a corner. The
+# value differs from the exterior angles of all regular polygons, so that round-off has no influence on their normals.
 CORNER = 48.0
-# Number of consecutive points that need not be sorted for the search.
+# Points are sorted in space before a search, down to groups of at most this size, within which their order is arbitrary.
 POINTS_PER_LEAF = 16
-# Overhang up to which a point faces the end of a side. Nodes on an axis or in a plane of symmetry lie slightly beyond
-# inclined facets, and nodes at the end of one side beyond that of the other if both sides strain differently.
-BESIDE = 0.05
+# Overhang up to which a point faces the end of a side [facet lengths]. Nodes on an axis or in a plane of symmetry lie
+# slightly beyond inclined facets. Nodes at the end of one side lie beyond the end of the other if both sides strain
+# differently.
+SMALL_OVERHANG = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +70,8 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
     return Places(nodes, side.all_local[facet], shape, gradient)
 
 
-def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, Indices, Array]:
-    """Return all facets that contain given points of a side; points on an edge or at a corner lie on several facets.
+def facets_containing(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, Indices, Array]:
+    """Return all facets that contain given points of a side. Points on an edge or at a corner lie on several facets.
 
     A projection finds only one of these facets, depending on round-off.
 
@@ -108,13 +109,13 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
     The normal of a node is the mean of the unit normals of its facets, weighted by their angles at the node. With these
     weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
     """
-    return _nodal_means(side, normals_at_nodes(side, coordinates), _angles(side, coordinates))
+    return _nodal_means(side, normals_at_nodes(side, coordinates), _weights(side, coordinates))
 
 
-def _nodal_means(side: Surface, normal: Array, angle: Array) -> Array:
-    """Return unit nodal normals (m, dim) of a side, given the results of `normals_at_nodes` and `_angles`."""
+def _nodal_means(side: Surface, normal: Array, weight: Array) -> Array:
+    """Return unit nodal normals (m, dim) of a side, given the results of `normals_at_nodes` and `_weights`."""
     node, total = side.all_local.ravel(), np.empty((len(side.points), normal.shape[2]))
-    for axis, component in enumerate((angle[..., None] * normal).reshape(-1, normal.shape[2]).T):
+    for axis, component in enumerate((weight[..., None] * normal).reshape(-1, normal.shape[2]).T):
         total[:, axis] = np.bincount(node, component, len(total))
     side.add_across_ends(total)
     length = np.linalg.norm(total, axis=1, keepdims=True)
@@ -129,17 +130,20 @@ def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) ->
     a corner if their normals enclose a larger angle than `corner` [degrees]. Nodes are those of `Surface.all_facets`.
     """
     node, dim = side.all_local.ravel(), coordinates.shape[1]
-    normals, angles = normals_at_nodes(side, coordinates), _angles(side, coordinates)
-    smooth, normal, angle = _nodal_means(side, normals, angles)[node], normals.reshape(-1, dim), angles.ravel()
-    # A node is a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
-    own = np.flatnonzero(side.node_weights)
-    deviates = np.einsum("pd,pd->p", normal[own], smooth[own]) < np.cos(np.radians(0.5 * corner))
-    corners = np.unique(node[own[deviates]])
-    by_node, start = own[np.argsort(node[own], kind="stable")], np.append(0, np.cumsum(np.bincount(node[own])))
+    normals, weights = normals_at_nodes(side, coordinates), _weights(side, coordinates)
+    smooth, normal, weight = _nodal_means(side, normals, weights)[node], normals.reshape(-1, dim), weights.ravel()
+    # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
+    distinct = np.flatnonzero(side.node_weights)
+    deviates = np.einsum("pd,pd->p", normal[distinct], smooth[distinct]) < np.cos(np.radians(0.5 * corner))
+    corners = np.unique(node[distinct[deviates]])
+    by_node, start = (
+        distinct[np.argsort(node[distinct], kind="stable")],
+        np.append(0, np.cumsum(np.bincount(node[distinct]))),
+    )
     for node_at_corner in corners:
         entries = by_node[start[node_at_corner] : start[node_at_corner + 1]]
         similar = normal[entries] @ normal[entries].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
-        total = (similar * angle[entries]) @ normal[entries]
+        total = (similar * weight[entries]) @ normal[entries]
         smooth[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
     return smooth.reshape(*side.all_local.shape, dim)
 
@@ -164,21 +168,22 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     return np.divide(normal, length, out=np.zeros_like(normal), where=length != 0.0)  # facets may degenerate to points
 
 
-def _angles(side: Surface, coordinates: Array) -> Array:
-    """Return the angles (n_facets, k) of all facets at their corners [radian].
+def _weights(side: Surface, coordinates: Array) -> Array:
+    """Return the weights (n_facets, k) of the normals of facets in averages at nodes.
 
-    They are 1 at other nodes and on lines, and 0 where `Surface.all_facets` repeats a node.
+    They are the interior angles of the facets at corners [radian], 1 at other nodes and on lines, and 0 where
+    `Surface.all_facets` repeats a node.
     """
     if coordinates.shape[1] == 2:
         return side.node_weights
     from fastcontact.contact import projection_kernels
 
-    angles = []
+    weights = []
     for block in side.blocks:
         n = elements.get(block.element).n_corners
-        angles.append(np.empty(block.facets.shape))
-        projection_kernels.angles(coordinates[block.facets], n, angles[-1])
-    return padded(angles)
+        weights.append(np.empty(block.facets.shape))
+        projection_kernels.angles(coordinates[block.facets], n, weights[-1])
+    return padded(weights)
 
 
 def interpolate(normals: Array, points: Places) -> Array:
@@ -196,11 +201,11 @@ def distance_from_edges(side: Surface, facet: Indices, xi: Array) -> Array:
 class Closest(NamedTuple):
     """Projections of n points on their closest facets.
 
-    Normals point to the right of the direction of a line, and to the side from which the nodes of a face run
-    counter-clockwise.
+    The normal of a line points to its right. Seen from the tip of the normal of a face, the nodes of the face are in
+    counter-clockwise order.
     """
 
-    facet: Indices  # (n,): row of the facet, the first of equally close ones
+    facet: Indices  # (n,): number of the facet, the lowest if several facets are equally close
     xi: Array  # (n, dim - 1): reference coordinates of the projection [-]
     normal: Array  # (n, dim): unit normal of the facet there [-]
     overhang: Array  # (n,): distance of the point beyond the end of its facet, in facet lengths; 0 inside [-]
@@ -208,63 +213,64 @@ class Closest(NamedTuple):
     distance: Array  # (n,): distance of the point from its projection [length]
 
 
-def closest(points: Array, corners: Array) -> Closest:
+def closest(points: Array, nodes: Array) -> Closest:
     """Project `points` (n, dim) [length] onto the closest of many facets of one element type.
 
-    `corners` (n_facets, n_nodes, dim) [length] are the nodes of the facets. In 2D they are lines of 2 or 3 nodes, in 3D
-    triangles of 3 or 6 nodes and quadrangles of 4, 8 or 9 nodes. Raises ContactError if the projection of a point fails.
+    `nodes` (n_facets, n_nodes, dim) [length] are the positions of the nodes of the facets. These are lines of 2 or 3 nodes in
+    2D, and triangles of 3 or 6 nodes or quadrangles of 4, 8 or 9 nodes in 3D. Raises ContactError if the projection of a
+    point fails.
     """
-    points, corners = np.ascontiguousarray(points), np.ascontiguousarray(corners)
+    points, nodes = np.ascontiguousarray(points), np.ascontiguousarray(nodes)
     n, dim = points.shape
     result = Closest(
         np.empty(n, np.intp), np.empty((n, dim - 1)), np.empty((n, dim)), np.empty(n), np.empty((n, dim)), np.empty(n)
     )
     if dim == 2:
-        _on_lines(points, corners, result)
+        _on_lines(points, nodes, result)
     else:
-        _on_faces(points, corners, result)
+        _on_faces(points, nodes, result)
     wrong = np.flatnonzero(np.isnan(result.distance))
     if len(wrong):
-        _raise_failure(points[wrong], result.facet[wrong], corners)
+        _raise_failure(points[wrong], result.facet[wrong], nodes)
     return result
 
 
-def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
-    """Project points onto the closest of facets of several element types, each with an array of corners in `kinds`.
+def closest_of_kinds(points: Array, nodes_by_type: Sequence[Array]) -> Closest:
+    """Project points onto the closest facet of several element types.
 
-    Facets are numbered through all types.
+    `nodes_by_type` contains the `nodes` of `closest` for each type. Facets are numbered consecutively through all types.
     """
-    if len(kinds) == 1:
-        return closest(points, kinds[0])
-    first = np.cumsum([0] + [len(corners) for corners in kinds])
-    by_kind = [closest(points, corners) for corners in kinds]
+    if len(nodes_by_type) == 1:
+        return closest(points, nodes_by_type[0])
+    first = np.cumsum([0] + [len(nodes) for nodes in nodes_by_type])
+    by_kind = [closest(points, nodes) for nodes in nodes_by_type]
     nearest = np.argmin([candidate.distance for candidate in by_kind], axis=0)
     facet, *other_fields = (np.stack(values)[nearest, np.arange(len(points))] for values in zip(*by_kind, strict=True))
     return Closest(facet + first[nearest], *other_fields)
 
 
-def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
-    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
-    corners = corners[numbers]
-    hull = corners
-    if corners.shape[1] == 3:  # a parabola lies in the polygon of its ends and this point (Bezier)
-        hull = corners.copy()
-        hull[:, 2] = 2.0 * corners[:, 2] - 0.5 * (corners[:, 0] + corners[:, 1])
+def _on_lines(points: Array, nodes: Array, closest: Closest) -> None:
+    numbers, order = tree_order(nodes[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
+    nodes = nodes[numbers]
+    hull = nodes
+    if nodes.shape[1] == 3:  # a parabola lies in the triangle of its ends and this Bezier point
+        hull = nodes.copy()
+        hull[:, 2] = 2.0 * nodes[:, 2] - 0.5 * (nodes[:, 0] + nodes[:, 1])
     tree = build(hull.min(axis=1), hull.max(axis=1))
     parallel_map(
-        lambda portion: search_2d_kernels.closest_facets(points, order, *portion, corners, numbers, tree, closest),
+        lambda portion: search_2d_kernels.closest_facets(points, order, *portion, nodes, numbers, tree, closest),
         portions(len(points)),
     )
 
 
-def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
+def _on_faces(points: Array, nodes: Array, closest: Closest) -> None:
     from fastcontact.contact.search import facets_3d_kernels, search_3d_kernels
     from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 
-    n, table = len(corners), tables(corners.shape[1])
-    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
-    centre = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
-    facets = Facets(corners[numbers], centre, np.empty(corners.shape), np.empty(n), np.empty(n))
+    n, table = len(nodes), tables(nodes.shape[1])
+    numbers, order = tree_order(nodes[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
+    centre = 0.5 * (nodes.min(axis=0).min(axis=0) + nodes.max(axis=0).max(axis=0))
+    facets = Facets(nodes[numbers], centre, np.empty(nodes.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
     parallel_map(
         lambda portion: facets_3d_kernels.prepare(facets, *portion, table.to_terms, table.weights, low, high),
@@ -279,13 +285,13 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     )
 
 
-def _raise_failure(points: Array, facet: Indices, corners: Array) -> None:
+def _raise_failure(points: Array, facet: Indices, nodes: Array) -> None:
     """Raise ContactError for points whose projection failed."""
     if facet[0] < 0:
         raise ContactError(f"{len(points)} projected points are not finite (first: {points[0]}): the solution diverged")
     raise ContactError(
         f"the projection of {len(points)} points did not converge (first: {points[0]} on facet {facet[0]} near "
-        f"{corners[facet[0]].mean(axis=0)}): the facet is folded or collapsed, so refine or repair the mesh there"
+        f"{nodes[facet[0]].mean(axis=0)}): the facet is folded or collapsed, so refine or repair the mesh there"
     )
 
 
@@ -355,13 +361,13 @@ def along_line_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
     """Project points (n, 2) onto a line along its interpolated normals; for the other parameters see `along_normals`."""
-    corners, at_nodes = coordinates[side.all_facets], normals
-    if len(side.blocks) > 1:  # beside curved lines, straight ones get a third node in the middle
+    nodes, at_nodes = coordinates[side.all_facets], normals
+    if len(side.blocks) > 1:  # if some lines are curved, straight lines get a third node in the middle
         curved = side.node_weights[:, :, None] > 0.0
-        corners, at_nodes = (np.where(curved, x, x[:, :2].mean(axis=1, keepdims=True)) for x in (corners, at_nodes))
+        nodes, at_nodes = (np.where(curved, x, x[:, :2].mean(axis=1, keepdims=True)) for x in (nodes, at_nodes))
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
     neighbour = np.where(smooth_ends(side, normals), side.line_neighbours, -1)
-    arguments = map(np.ascontiguousarray, (points, corners, at_nodes))
+    arguments = map(np.ascontiguousarray, (points, nodes, at_nodes))
     search_2d_kernels.along_normals(*arguments, neighbour, facet, xi, overhang)
     xi = xi[:, None]
     return facet, xi, overhang, interpolate(normals[facet], places(side, facet, xi))

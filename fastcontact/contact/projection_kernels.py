@@ -56,8 +56,8 @@ def coefficients(values, to_terms, first, begin, end, out):
         for k in range(out.shape[1]):
             p, q, r = 0.0, 0.0, 0.0
             for a in range(m if k < m else 0):
-                share = to_terms[k, a]
-                p, q, r = p + share * values[f, a, 0], q + share * values[f, a, 1], r + share * values[f, a, 2]
+                weight = to_terms[k, a]
+                p, q, r = p + weight * values[f, a, 0], q + weight * values[f, a, 1], r + weight * values[f, a, 2]
             out[first + f, k, 0], out[first + f, k, 1], out[first + f, k, 2] = p, q, r
 
 
@@ -101,7 +101,7 @@ def beyond(triangle, s, t):
 
 
 @innermost_kernel
-def inside(triangle, s, t):
+def clamped(triangle, s, t):
     """Return reference coordinates moved into a facet, independently of the choice of its first corner."""
     if triangle:
         a, b, c = max(s, 0.0), max(t, 0.0), max(1.0 - s - t, 0.0)
@@ -121,7 +121,7 @@ def _rank(terms, triangle, f, s, t, length):
         total = max(-s, 0.0) + max(-t, 0.0) + max(s + t - 1.0, 0.0)
     else:
         total = 0.5 * (max(abs(s) - 1.0, 0.0) + max(abs(t) - 1.0, 0.0))
-    a, b = inside(triangle, s, t)
+    a, b = clamped(triangle, s, t)
     offset = minus(_interpolated(terms, f, s, t)[0], _interpolated(terms, f, a, b)[0])
     return np.sqrt(dot(offset, offset)) / length + 1e-3 * total
 
@@ -177,6 +177,6 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
                 )
                 if rank < _rank(terms, triangular[f], f, s, t, length):
                     f, s, t, over = next_facet, a, b, beyond(triangular[next_facet], a, b)
-        s, t = inside(triangular[f], s, t)
+        s, t = clamped(triangular[f], s, t)
         facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > LENGTH_ROUND_OFF else 0.0
         normal[i, 0], normal[i, 1], normal[i, 2] = unit(_interpolated(directions, f, s, t)[0])

@@ -38,8 +38,9 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
         )
     for side in (secondary, primary):
         _check_normals(mesh, name, side)
-    (x, normals, sizes), (y, other_normals, other_sizes) = (_facet_geometry(mesh, s) for s in (secondary, primary))
-    difference = y[None] - x[:, None]
+    centres, normals, sizes = _facet_geometry(mesh, secondary)
+    other_centres, other_normals, other_sizes = _facet_geometry(mesh, primary)
+    difference = other_centres[None] - centres[:, None]
     height, distance = np.einsum("ijd,id->ij", difference, normals), np.linalg.norm(difference, axis=2)
     facing = normals @ other_normals.T < 0
     ahead = (height > -0.1 * distance) | (distance < np.minimum.outer(sizes, other_sizes))
@@ -76,8 +77,8 @@ def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
         )
 
 
-def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
-    """Return the sorted nodes of the facets that two groups share; a mesh may contain a facet more than once."""
+def nodes_of_shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
+    """Return the sorted nodes of the facets that two groups share, even if the mesh contains a facet once for each group."""
     facets_of_group, facets_of_other = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
     nodes = [np.empty(0, np.int32)]
     for name in facets_of_group.keys() & facets_of_other.keys():

@@ -43,7 +43,9 @@ class FacetBlock:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Facets of one side of a contact pair, in blocks of one element type each; facets are numbered through all blocks.
+    """Facets of one side of a contact pair.
+
+    Each block contains the facets of one element type. Facets are numbered consecutively through all blocks.
 
     Attributes
     ----------
@@ -180,7 +182,7 @@ class Surface:
         adjacency.sort_indices()
         return adjacency.indptr.astype(np.intp), adjacency.indices.astype(np.intp)
 
-    def corners(self, coordinates: Array) -> list[Array]:
+    def node_positions(self, coordinates: Array) -> list[Array]:
         """Return the positions (n_facets, n_nodes, dim) of the nodes of the facets of each block [length].
 
         `coordinates` (n_points, dim) are those of all points of the mesh [length].
@@ -189,7 +191,7 @@ class Surface:
 
 
 def by_block(numbers: Indices, sizes: Iterable[int]) -> Iterator[tuple[Indices, Indices]]:
-    """Distribute items, whose `numbers` (n,) count through all blocks, to blocks of the given sizes.
+    """Distribute items to blocks of the given sizes; `numbers` (n,) are consecutive through all blocks.
 
     Yields, for each block, the positions of its items in `numbers`, and their rows in the block.
     """

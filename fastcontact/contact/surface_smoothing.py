@@ -38,7 +38,7 @@ PASSES = 3
 
 @dataclass(frozen=True, eq=False)
 class SmoothSide:
-    """Heights and curvatures of the smooth surface above the facets of one side, numbered through its blocks.
+    """Heights and curvatures of the smooth surface above the facets of one side.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Smoothing:
         smoothing = cls(smooth_secondary, smooth_primary)
         axes = [frames(side, points, points) for side in (secondary, primary)]
         middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
-        opposite = closest_of_kinds(np.concatenate(middles), primary.corners(points)).facet
+        opposite = closest_of_kinds(np.concatenate(middles), primary.node_positions(points)).facet
         factor = smoothing.shared(np.arange(len(opposite)), opposite, axes)
         is_corrected = factor[:, 0] * np.abs(smooth_secondary.heights).max(axis=(1, 2)) > 0.0
         is_corrected |= factor[:, 1] * np.abs(smooth_primary.heights[opposite]).max(axis=(1, 2)) > 0.0
@@ -248,7 +248,7 @@ class _Fit:
 
 
 def _fit(block: FacetBlock, points: Array, around: Array, valid: Mask, degree: int) -> _Fit:
-    """Fit surfaces to the `valid` (n, m) ones of the points `around` the facets of a block, (n, m, dim).
+    """Fit surfaces to the points `around` (n, m, dim) the facets of a block, of which only the `valid` ones (n, m) are used.
 
     In each pass, planes are rotated to the tangents of the surfaces, and the curvatures of the polynomials are moved to
     `curvature`.
@@ -266,7 +266,7 @@ def _fit(block: FacetBlock, points: Array, around: Array, valid: Mask, degree: i
 
 
 def _tilted(axes: Array, slope: Array) -> Array:
-    """Return axes (n, dim, dim) after the smallest rotation to the normals of surfaces of `slope` (n, dim - 1) over them."""
+    """Return axes (n, dim, dim), rotated by the smallest angle to the normals of surfaces with the `slope` (n, dim - 1)."""
     normal = axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     twice_mean = axes[:, -1] + normal
@@ -339,10 +339,13 @@ def _limiter(near: csr_array, curvature: Array, axes: Array) -> Array:
 
 
 def _in_plane_of(axes: Array, other_axes: Array, tensor: Array) -> Array:
-    """Return tensors (n, d, d) given along `other_axes` (n, d, dim) along `axes`, after a rotation between both planes."""
-    turn = np.einsum("nid,njd->nij", axes, other_axes)
-    if turn.shape[1] == 2:  # the closest rotation or reflection
-        cofactors = turn[:, ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]]
-        turn = turn + np.sign(np.linalg.det(turn))[:, None, None] * cofactors
-    turn = turn / (np.abs(np.linalg.det(turn)) ** (1.0 / turn.shape[1]))[:, None, None]
-    return np.asarray(turn @ tensor @ turn.transpose(0, 2, 1))
+    """Return the components along `axes` of tensors (n, d, d) that are given along `other_axes` (n, d, dim).
+
+    The plane of the other axes is first rotated into the plane of `axes`.
+    """
+    rotation = np.einsum("nid,njd->nij", axes, other_axes)
+    if rotation.shape[1] == 2:  # the closest rotation or reflection
+        cofactors = rotation[:, ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]]
+        rotation = rotation + np.sign(np.linalg.det(rotation))[:, None, None] * cofactors
+    rotation = rotation / (np.abs(np.linalg.det(rotation)) ** (1.0 / rotation.shape[1]))[:, None, None]
+    return np.asarray(rotation @ tensor @ rotation.transpose(0, 2, 1))

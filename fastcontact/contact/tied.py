@@ -1,9 +1,10 @@
 """Tied contact: linear equations for zero opening and zero slip from the beginning.
 
 The sides are paired once, in the undeformed configuration. The relative displacement of points that face each other remains
-zero in every direction. The test functions are the multipliers of the formulation. If forces are nodal, there is one set of
-equations per node. If forces act at integration points, the equations are moments with the functions of the multiplier
-field, as in the mortar method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
+zero in every direction. The test functions are the multiplier functions of the formulation. If forces are nodal, there is
+one set of equations per node. If forces act at integration points, the equations are moments with the functions of the
+multiplier field, as in the mortar method (Bernardi, Maday and Patera, 1994), so that the augmentation parameter has no
+influence.
 
 If supports hold both sides at a node, the secondary side has fewer free displacements than multipliers. The multipliers are
 then not determined, because multipliers that alternate from node to node and decay along the surface do no work. Their number
@@ -27,7 +28,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Pairing, normals
-from fastcontact.contact.projection import at_common_edges, places
+from fastcontact.contact.projection import facets_containing, places
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.linear.sparse_rows import nodal_rows
@@ -55,7 +56,8 @@ class TiedPair:
     areas : ndarray (q,), optional
         Integrals of the test functions of the equations [area].
     reduction : csr_array (q dim, q dim), optional
-        Matrix from the remaining multipliers to all multipliers where supports hold both sides, see `reduction`.
+        Matrix from the remaining multipliers to all multipliers, if supports hold both sides at some nodes; see
+        `reduction`.
     """
 
     moments: csr_array
@@ -122,9 +124,8 @@ def _cleaned(rows: csr_array) -> csr_array:
 def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: csr_array) -> csr_array:
     """Return the matrix (q dim, q dim) that maps the remaining multipliers to all multipliers.
 
-    The columns of removed multipliers are empty.
-
-    Multipliers are forces, ordered by their components along the frames.
+    The columns of removed multipliers are empty. Multipliers are forces: first the normal components of all nodes, then the
+    components along each tangent.
 
     Parameters
     ----------
@@ -144,7 +145,7 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     held_nodes, free = np.flatnonzero(n_held), np.eye(dim) - held
     held_part = np.linalg.norm(np.einsum("qde,qke->qkd", held, frames), axis=2)
     is_free = np.argsort(np.argsort(-held_part, axis=1, kind="stable"), axis=1) >= n_held[:, None]
-    freed = np.where(is_free[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
+    free_part = np.where(is_free[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
     around = coo_array(csr_array(beside[nodes])[:, nodes][held_nodes])
     is_pair = (areas[around.col] > 0.0) & (areas[held_nodes[around.row]] > 0.0) & (held_nodes[around.row] != around.col)
     receiver, giver = around.row[is_pair], around.col[is_pair]
@@ -153,10 +154,12 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     share = held[held_nodes] @ np.linalg.pinv(total, hermitian=True)
     rows, columns = np.append(np.arange(q), held_nodes[receiver]), np.append(np.arange(q), giver)
     size = np.where(areas > 0.0, areas, 1.0)
-    tractions = np.concatenate([freed, share[receiver] @ freed[giver]]) * (size[rows] / size[columns])[:, None, None]
+    tractions = (
+        np.concatenate([free_part, share[receiver] @ free_part[giver]]) * (size[rows] / size[columns])[:, None, None]
+    )
     blocks = frames[rows] @ tractions
     blocks[np.abs(blocks) < ROUND_OFF] = 0.0
-    row, column = (np.arange(dim) * q + nodes_of[:, None] for nodes_of in (rows, columns))
+    row, column = (np.arange(dim) * q + node[:, None] for node in (rows, columns))
     row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     matrix = csr_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=(q * dim, q * dim))
     matrix.eliminate_zeros()
@@ -178,10 +181,10 @@ def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface
     """
     size = float(np.ptp(constraints.positions, axis=0).max(initial=0.0))
     # At an edge the derivative is the mean over the facets that meet there, as the facet of the pairing depends on round-off.
-    point, facet, xi = at_common_edges(primary, pairing.facet, pairing.xi)
+    point, facet, xi = facets_containing(primary, pairing.facet, pairing.xi)
     normal, feet = normals(constraints.directions)[point], places(primary, facet, xi)
-    axes = np.einsum("pkj,pkd->pdj", feet.gradient, points[feet.nodes])
-    gradient = np.einsum("pkj,pjd->pkd", feet.gradient, np.linalg.pinv(axes))
+    base_vectors = np.einsum("pkj,pkd->pdj", feet.gradient, points[feet.nodes])
+    gradient = np.einsum("pkj,pjd->pkd", feet.gradient, np.linalg.pinv(base_vectors))
     share = 1.0 / np.bincount(point)
     mean = csr_array((share[point], (point, np.arange(len(point)))))
     slopes = [np.einsum("pkd,pd->pk", gradient, direction[point]) for direction in constraints.directions]
@@ -189,10 +192,10 @@ def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface
     translations, rotations = np.split(rigid_modes(points, "3d"), [points.shape[1]], axis=1)
     arms = np.stack([lever @ rotations for lever in levers], axis=1)
     spurious = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
-    translates = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
+    translation = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
     # Lengths of arms form a tensor. One length per tangent would depend on the choice of tangents if the gap is not normal.
     lengths = spurious @ np.linalg.pinv(arms)
-    lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (translates > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
+    lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (translation > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
     tangents = [
         csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ lever for j, lever in enumerate(levers)))
         for k, tangent in enumerate(constraints.tangents)

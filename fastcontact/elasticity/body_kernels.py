@@ -343,25 +343,25 @@ def _cauchy(F, P, finite, c, q, out):
 
 
 @kernel
-def _assemble(local, slots, inside, data):
-    """Add the stiffness of a cell, see `_stiffness`, to `data` (n_blocks, dim, dim), in the rows of nodes marked in `inside`.
+def _assemble(local, slots, in_part, data):
+    """Add the stiffness of a cell, see `_stiffness`, to `data` (n_blocks, dim, dim), in rows of nodes marked in `in_part`.
 
     The blocks (a, b) and (b, a) of a node pair are transposes of each other, and diagonal blocks are symmetric.
     """
     n_nodes, dim, width, flat = len(slots), data.shape[1], local.shape[1], data.reshape(-1)
     for b in range(n_nodes):
         for a in range(b + 1):
-            upper, lower, at_upper, at_lower = slots[a, b], slots[b, a], inside[a], inside[b]
+            upper, lower, add_upper, add_lower = slots[a, b], slots[b, a], in_part[a], in_part[b]
             xx, xy, yx, yy = local[b, a], local[width + b, a], local[width + a, b], local[2 * width + b, a]
             if dim == 3:
                 xz, zx = local[3 * width + b, a], local[3 * width + a, b]
                 yz, zy, zz = local[4 * width + b, a], local[4 * width + a, b], local[5 * width + b, a]
-                add_block(flat, at_upper, at_lower, upper, lower, (xx, xy, xz, yx, yy, yz, zx, zy, zz))
+                add_block(flat, add_upper, add_lower, upper, lower, (xx, xy, xz, yx, yy, yz, zx, zy, zz))
                 continue
-            if at_upper:
+            if add_upper:
                 for e, value in enumerate((xx, xy, yx, yy)):
                     flat[4 * upper + e] += value
-            if a != b and at_lower:
+            if a != b and add_lower:
                 for e, value in enumerate((xx, yx, xy, yy)):
                     flat[4 * lower + e] += value
 
@@ -394,7 +394,7 @@ def linearise(
     gradient, volume, forces = np.empty((3 * n_q + 1, width)), np.empty(n_q), np.empty((4, width))
     F, G, Fs, Gs = np.empty((3, 3)), np.empty((3, 3)), np.empty((3 * n_q, 3)), np.empty((3 * n_q, 3))
     ratio, stretch_z, pressure = np.empty(n_q), np.ones(n_q), np.empty(n_q)
-    P, A, inside = np.empty((3, 3)), np.zeros((18, 12)), np.empty(n_nodes, np.bool_)
+    P, A, in_part = np.empty((3, 3)), np.zeros((18, 12)), np.empty(n_nodes, np.bool_)
     before, after, factors = np.zeros(9), np.empty(9), np.zeros((3 * n_q, 4))
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     local = np.empty((n_pairs * width, width))
@@ -403,7 +403,7 @@ def linearise(
     # branches. This would take as long as the law of the first invariant itself. Therefore, the law is called directly here.
     row, law, D, direct = -1, constants[0], moduli[0], False
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, inside):
+        if not owned(cells, c, owner, part, in_part):
             continue
         _map(points, displacement, cells, c, columns, x, maps)
         for q in range(n_q):
@@ -455,18 +455,18 @@ def linearise(
             if tangent and (flows or not elastic):
                 _store_tangent(gradient, q, volume[q], A, dim, n_factors, left, right)
                 n_factors += 3
-            if inside[0]:
+            if in_part[0]:
                 for e in range(9 if len(new) else 0):
                     new[c, q, e] = before[e] if direct else after[e]
                 _cauchy(F, P, finite, c, q, stress)
         _integrate(factors, gradient, forces, 0)
-        if inside[0]:
+        if in_part[0]:
             energy[c, 0], energy[c, 1] = stored, dissipated
         for b in range(n_nodes):
-            if inside[b]:
+            if in_part[b]:
                 for i in range(dim):
                     force[cells[c, b], i] += forces[i, b]
         if n_factors:
             _stiffness(left, right, n_factors, dim, bulk_mean, slopes if bulk_mean > 0.0 else slopes[:0], local)
-            _assemble(local, slots[c], inside, data)
+            _assemble(local, slots[c], in_part, data)
     return 0, -1

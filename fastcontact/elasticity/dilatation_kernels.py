@@ -80,15 +80,15 @@ def back_substitute(L, y):
 
 
 @kernel
-def add_products(factors, g, slots, c, inside, row, data):
+def add_products(factors, g, slots, c, in_part, row, data):
     """Add ``g^T diag(factors) g`` of cell `c`, with `g` (m, n_nodes * dim), to `data` (n_blocks, dim, dim).
 
-    Only the rows of nodes that are marked in `inside` (n_nodes,) are changed. `slots` (n_cells, n_nodes, n_nodes) contains
+    Only the rows of nodes that are marked in `in_part` (n_nodes,) are changed. `slots` (n_cells, n_nodes, n_nodes) contains
     the indices of the blocks in `data`, and `row` (n_nodes * dim,) is overwritten.
     """
-    n_nodes, dim = len(inside), data.shape[1]
+    n_nodes, dim = len(in_part), data.shape[1]
     for a in range(n_nodes):
-        if not inside[a]:
+        if not in_part[a]:
             continue
         for i in range(dim):
             row[:] = 0.0
@@ -112,15 +112,15 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
     x, gradient = np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
     J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
     mass, g, factors = np.empty((size, size)), np.empty((size, n_nodes * dim)), np.empty(size)
-    row, inside = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
+    row, in_part = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
         factors[:], factors[0] = bulk[material[c], 1], bulk[material[c], 0]
-        if factors[0] == 0.0 or not owned(cells, c, owner, part, inside):
+        if factors[0] == 0.0 or not owned(cells, c, owner, part, in_part):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g)
         reduce(mass, g)
-        add_products(factors, g, slots, c, inside, row, data)
+        add_products(factors, g, slots, c, in_part, row, data)
 
 
 @kernel

@@ -35,13 +35,13 @@ def _map(points, cell, N, dN, q, gradient):
 
 
 @kernel
-def owned(cells, c, owner, part, inside):
-    """Fill `inside` (n_nodes,) with the mask of the nodes of cell `c` that belong to `part`; return whether there are any."""
-    any_inside = False
+def owned(cells, c, owner, part, in_part):
+    """Fill `in_part` (n_nodes,) with whether the nodes of cell `c` belong to `part`; return whether any of them do."""
+    any_in_part = False
     for a in range(cells.shape[1]):
-        inside[a] = owner[cells[c, a]] == part
-        any_inside = any_inside or inside[a]
-    return any_inside
+        in_part[a] = owner[cells[c, a]] == part
+        any_in_part = any_in_part or in_part[a]
+    return any_in_part
 
 
 @kernel
@@ -83,9 +83,9 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
     local = np.empty((n_nodes, n_nodes, 2, 2))
-    inside = np.empty(n_nodes, np.bool_)
+    in_part = np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, inside):
+        if not owned(cells, c, owner, part, in_part):
             continue
         local[:] = 0.0
         if not _integrate(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):
@@ -94,11 +94,11 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
             local[b, b, 1, 0] = local[b, b, 0, 1]  # equal up to round-off; makes K bitwise symmetric
             for a in range(b + 1):
                 upper, lower = slots[c, a, b], slots[c, b, a]
-                if inside[a]:
+                if in_part[a]:
                     for i in range(2):
                         for j in range(2):
                             data[upper, i, j] += local[a, b, i, j]
-                if a != b and inside[b]:
+                if a != b and in_part[b]:
                     for i in range(2):
                         for j in range(2):
                             data[lower, j, i] += local[a, b, i, j]

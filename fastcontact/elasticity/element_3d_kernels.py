@@ -74,38 +74,38 @@ def _integrate_products(x, slopes, weights, gradient, g):
 
 
 @kernel
-def add_block(flat, at_upper, at_lower, upper, lower, block):
+def add_block(flat, add_upper, add_lower, upper, lower, block):
     """Add the `block` (9,) of a node pair at the slot `upper`, and its transpose at the slot `lower`.
 
-    They are added only if `at_upper` and `at_lower` are true. The transpose of a diagonal block is not added.
+    `add_upper` and `add_lower` state whether they are added. The transpose of a diagonal block is not added.
     """
     u, v = 9 * upper, 9 * lower
-    if at_upper:
+    if add_upper:
         for k in range(9):
             flat[u + k] += block[k]
-    if u != v and at_lower:
+    if u != v and add_lower:
         for k in range(9):
             flat[v + k] += block[3 * (k % 3) + k // 3]
 
 
 @inlined_kernel
-def _add_isotropic_block(flat, differ, at_upper, at_lower, upper, lower, coupling, shear, g):
+def _add_isotropic_block(flat, differ, add_upper, add_lower, upper, lower, lam, mu, g):
     """Add the block of two nodes for Lamé's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
     `differ` states whether the nodes differ. The order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
     """
     xx, yy, zz, xy, xz, yz, yx, zx, zy = g
-    trace, both = shear * (xx + yy + zz), coupling + shear
-    k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
-    k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
+    trace, lam_mu = mu * (xx + yy + zz), lam + mu
+    k01, k02, k12 = lam * xy + mu * yx, lam * xz + mu * zx, lam * yz + mu * zy
+    k10, k20, k21 = lam * yx + mu * xy, lam * zx + mu * xz, lam * zy + mu * yz
     if not differ:  # equal up to round-off; makes K bitwise symmetric
         k10, k20, k21 = k01, k02, k12
-    block = both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace
-    add_block(flat, at_upper, at_lower, upper, lower, block)
+    block = lam_mu * xx + trace, k01, k02, k10, lam_mu * yy + trace, k12, k20, k21, lam_mu * zz + trace
+    add_block(flat, add_upper, add_lower, upper, lower, block)
 
 
 @kernel
-def _add_isotropic(g, coupling, shear, slots, c, inside, flat):
+def _add_isotropic(g, lam, mu, slots, c, in_part, flat):
     """Add the blocks of a cell for Lamé's constants, given the integrals of `_integrate_products`."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
@@ -113,11 +113,11 @@ def _add_isotropic(g, coupling, shear, slots, c, inside, flat):
                 g[0, a, b], g[3, a, b], g[5, a, b], g[1, a, b], g[2, a, b], g[4, a, b], g[1, b, a], g[2, b, a], g[4, b, a],
             )  # fmt: skip
             upper, lower = slots[c, a, b], slots[c, b, a]
-            _add_isotropic_block(flat, a != b, inside[a], inside[b], upper, lower, coupling, shear, products)
+            _add_isotropic_block(flat, a != b, in_part[a], in_part[b], upper, lower, lam, mu, products)
 
 
 @kernel
-def _add_general(g, tensor, products, block, slots, c, inside, flat):
+def _add_general(g, tensor, products, block, slots, c, in_part, flat):
     """Add the blocks of a cell for any moduli: K_ij = D_ikjl g_kl; `products` and `block` (9,) are overwritten."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
@@ -131,11 +131,11 @@ def _add_general(g, tensor, products, block, slots, c, inside, flat):
                 block[row] = total
             if a == b:  # equal up to round-off; makes K bitwise symmetric
                 block[3], block[6], block[7] = block[1], block[2], block[5]
-            add_block(flat, inside[a], inside[b], slots[c, a, b], slots[c, b, a], block)
+            add_block(flat, in_part[a], in_part[b], slots[c, a, b], slots[c, b, a], block)
 
 
 @kernel
-def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, gradient, flat):
+def _add_tetrahedron(points, cells, c, volume, lam, mu, slots, in_part, gradient, flat):
     """Add the blocks of a linear tetrahedron, whose gradients (4, 3) are constant, for Lamé's constants.
 
     `volume` is that of the reference cell. Returns whether the Jacobian is positive. With a fixed number of nodes, this takes
@@ -161,7 +161,7 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, g
         for a in range(b + 1):
             x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
             g = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz, y * gx, z * gx, z * gy
-            _add_isotropic_block(flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, g)
+            _add_isotropic_block(flat, a != b, in_part[a], in_part[b], slots[c, a, b], slots[c, b, a], lam, mu, g)
     return True
 
 
@@ -176,28 +176,28 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    g, inside, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
+    g, in_part, tetrahedron_gradient = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
     tensor, products, block = np.empty((9, 9)), np.empty(9), np.empty(9)
     volume = 0.0
     for weight in weights:
         volume += weight
     flat = data.reshape(-1)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, inside):
+        if not owned(cells, c, owner, part, in_part):
             continue
-        coupling, shear = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
+        lam, mu = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
         if n_nodes == 4 and isotropic[material[c]]:
-            if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, corners, flat):
+            if not _add_tetrahedron(points, cells, c, volume, lam, mu, slots, in_part, tetrahedron_gradient, flat):
                 return c
             continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
         if isotropic[material[c]]:
-            _add_isotropic(g, coupling, shear, slots, c, inside, flat)
+            _add_isotropic(g, lam, mu, slots, c, in_part, flat)
         else:
             _tensor(moduli[material[c]], tensor)
-            _add_general(g, tensor, products, block, slots, c, inside, flat)
+            _add_general(g, tensor, products, block, slots, c, in_part, flat)
     return -1
 
 

@@ -87,15 +87,15 @@ def subtract_stiffness(
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]
     n_modes = 4 if dim == 2 else 13
-    x, row, inside = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
+    x, row, in_part = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     modal, mixed, factors = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.full(n_modes, -1.0)
     for c in range(n_cells):
-        if not with_modes[material[c, 0]] or not owned(cells, c, owner, part, inside):
+        if not with_modes[material[c, 0]] or not owned(cells, c, owner, part, in_part):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)
         reduce(modal, mixed)
-        add_products(factors, mixed, slots, c, inside, row, data)
+        add_products(factors, mixed, slots, c, in_part, row, data)
 
 
 @kernel

@@ -1,8 +1,8 @@
 """Nonlinear material laws: von Mises plasticity, and hyperelasticity at finite strains.
 
 For `constitutive_kernels`, a law is a row of constants: the number of the law, the shear modulus, the bulk modulus of the
-volumetric part ``U(J) = K (J - 1)^2 / 2``, and further constants. Loads, contact and checks use the isotropic elasticity at
-small strains.
+volumetric part ``U(J) = K (J - 1)^2 / 2``, and further constants. Other modules, such as those of
+loads and contact, use the isotropic moduli at small strains.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from fastcontact.elasticity.materials import NEARLY_INCOMPRESSIBLE, Constant, Li
 from fastcontact.errors import ModelError
 
 STRAINS = ("small", "finite")
-# Largest plastic strain in a cell for which linear kinematics cause no warning. Under a ball that is pressed into a material
-# without hardening, the mean contact pressure is 2.6 times the yield stress if the largest plastic strain is 0.1, 2.3 times
-# if it is 0.5, and 2.1 times if it is 1.1. At plastic strains from 0.13 to 0.24, the pressure is 8 to 10 % lower and the
-# force 4 to 7 % lower than with finite strains.
+# Largest plastic strain of a cell that causes no warning under linear kinematics. If a ball is pressed into a material
+# without hardening, the mean contact pressure is 2.6 times the yield stress when the largest plastic strain is 0.1, 2.3
+# times when it is 0.5, and 2.1 times when it is 1.1. At plastic strains from 0.13 to 0.24, the pressure is 8 to 10 % lower
+# and the force 4 to 7 % lower than with finite strains.
 LARGEST_PLASTIC_STRAIN = 0.2
 
 
@@ -75,11 +75,11 @@ class ElasticPlastic(NonlinearElastic):
         Initial yield stress in uniaxial tension [pressure].
     hardening : sequence of (float, float)
         Isotropic hardening: pairs of equivalent plastic strain [-], ascending from zero, and yield stress [pressure]. The
-        yield stress is interpolated linearly, and is constant beyond the last pair. By default, plasticity is perfect. The
-        first pair, (0, `yield_stress`), may be omitted.
+        yield stress is interpolated linearly, and is constant beyond the last pair. By default, the material is perfectly
+        plastic. The first pair, (0, `yield_stress`), may be omitted.
     kinematic : float
-        Modulus of linear kinematic hardening (Prager, 1956), the slope of the stress over the plastic strain in uniaxial
-        tension [pressure]. It is available only for small strains.
+        Modulus of linear kinematic hardening (Prager, 1956), the slope of the curve of stress versus plastic strain in
+        uniaxial tension [pressure]. It is available only for small strains.
     volumetric : str
         As for `LinearElastic`, but ``"auto"`` always selects the mean dilatation, because plastic flow preserves the volume.
     density, expansion, conductivity : float, optional
@@ -193,7 +193,7 @@ class NeoHookean(Hyperelastic):
 
 
 @dataclass(frozen=True)
-class OwnConstants(Hyperelastic):
+class FromConstants(Hyperelastic):
     """Base class of laws whose constants determine E and nu.
 
     Parameters
@@ -223,7 +223,7 @@ class OwnConstants(Hyperelastic):
         super().__post_init__()
 
 
-class Polynomial(OwnConstants):
+class Polynomial(FromConstants):
     """Base class of laws ``C10 (I1 - 3) + C01 (I2 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3`` of the isochoric invariants."""
 
     bulk: float
@@ -311,7 +311,7 @@ class Yeoh(Polynomial):
 
 @typed(ModelError)
 @dataclass(frozen=True)
-class Ogden(OwnConstants):
+class Ogden(FromConstants):
     """Ogden hyperelasticity (Ogden, 1972): the sum of ``2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3)``.
 
     l1, l2 and l3 are the isochoric stretches. The volumetric energy is ``K (J - 1)^2 / 2`` with the volume ratio J.

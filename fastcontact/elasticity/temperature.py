@@ -75,7 +75,7 @@ class Temperature:
             raise ModelError(f"{self.name} is not finite at point {int(np.flatnonzero(~np.isfinite(self.value))[0])}")
 
     def rise(self, mesh: Mesh) -> Array:
-        """Return the rise above the reference (n_points,) [temperature] at multiplier 1, which is zero at other points."""
+        """Return the rise above the reference (n_points,) [temperature] at multiplier 1; it is zero outside the groups."""
         points = solid_points(mesh, self.groups)
         rise = np.zeros(mesh.n_points)
         if isinstance(self.value, np.ndarray):
@@ -85,7 +85,7 @@ class Temperature:
         return rise
 
 
-def histories(
+def temperature_history(
     groups: tuple[str, ...] | None, values: Array, reference: float, times: Sequence[float]
 ) -> list[Temperature]:
     """Return a temperature for each of several instants, with ramps that interpolate linearly between the instants.

@@ -1,4 +1,4 @@
-"""Common part of direct solvers: substitution with the factors of K, and constraints by the Schur complement.
+"""Base class of direct solvers, which solve systems with the factors of K and constraints with the Schur complement.
 
 If a right-hand side is a linear combination of earlier ones, its solution is computed as the same combination of the earlier
 solutions (`KnownLoads`).
@@ -33,7 +33,7 @@ STORED_LOADS = 4
 
 
 class KnownLoads:
-    """The last right-hand sides and their solutions, from which those of linear combinations are computed."""
+    """The last right-hand sides and their solutions, which are combined for linear combinations of these right-hand sides."""
 
     def __init__(self, n: int) -> None:
         self._loads = self._solutions = np.empty((0, n))
@@ -81,9 +81,9 @@ class KnownLoads:
 class FactorSolver(LinearSolver):
     """Base class of direct solvers; subclasses implement the factorisation.
 
-    Unknowns that may occur in equations, denoted by c, are eliminated last. With the factors ``K = L D L.T``, their block of
-    the inverse is ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, for which no system with the matrix K is solved. Under contact
-    forces, the displacements of the other unknowns follow from those of the unknowns c by back substitution alone.
+    Unknowns that may occur in constraint equations, denoted by c, are eliminated last. With the factors ``K = L D L.T``,
+    their block of the inverse is ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, which is computed without solving systems with K.
+    Under contact forces, the other displacements follow from those of the unknowns c by back substitution alone.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ class FactorSolver(LinearSolver):
 class LoadedFactor(Loaded):
     """The factors of a `FactorSolver` with a right-hand side f (n,); see `linear.protocol.Loaded`.
 
-    `free` (n,) is the solution without equations [length].
+    `free` (n,) is the solution without constraints [length].
     """
 
     def __init__(self, solver: FactorSolver, f: Array, free: Array) -> None:
@@ -227,7 +227,9 @@ class LoadedFactor(Loaded):
 
 
 class CondensedProblem(Loaded):
-    """The system after static condensation to the k unknowns that may occur in equations; see `linear.protocol.Loaded`.
+    """The system after static condensation to the k unknowns that may occur in constraint equations.
+
+    See `linear.protocol.Loaded`.
 
     All vectors have the length k.
 
@@ -236,7 +238,7 @@ class CondensedProblem(Loaded):
     inverse : ndarray (k, k)
         Block of ``K^-1`` for these unknowns, the inverse of the condensed matrix [length / force].
     free : ndarray (k,)
-        Solution without equations [length].
+        Solution without constraints [length].
     """
 
     def __init__(self, inverse: Array, free: Array) -> None:

@@ -166,9 +166,9 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
     """
     other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
     turn, shift = _motion(rotation, sign)
-    corners = other.corners(mesh.points)
-    near = _closest(mesh.points[nodes] @ turn.T + shift, vectors_to_facets(mesh, nodes) @ turn.T, other, corners)
-    sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in corners])
+    nodes_by_type = other.node_positions(mesh.points)
+    near = _closest(mesh.points[nodes] @ turn.T + shift, vectors_to_facets(mesh, nodes) @ turn.T, other, nodes_by_type)
+    sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in nodes_by_type])
     if (near.distance > LARGEST_DISTANCE * sizes[near.facet]).any() or (near.overhang > LARGEST_DISTANCE).any():
         return None
     projected = places(other, near.facet, near.xi)
@@ -183,18 +183,18 @@ def _motion(rotation: Rotation, sign: float) -> tuple[Array, Array]:
     return turn, centre - turn @ centre
 
 
-def _closest(positions: Array, inward: Array, other: Surface, corners: list[Array]) -> Closest:
+def _closest(positions: Array, inward: Array, other: Surface, nodes_by_type: list[Array]) -> Closest:
     """Return the projections of positions (n, dim) [length] on the closest facets of a surface with nodes at `corners`.
 
     Where two bodies are in contact, a position lies on facets of both. It is assigned to the body into which `inward`
     (n, dim) points.
     """
-    near, inside = (closest_of_kinds(positions + shift, corners) for shift in (0.0, LARGEST_DISTANCE * inward))
+    near, inside = (closest_of_kinds(positions + shift, nodes_by_type) for shift in (0.0, LARGEST_DISTANCE * inward))
     nodes, nodes_inside = (places(other, closest.facet, closest.xi).nodes for closest in (near, inside))
-    first_facet = np.cumsum([0] + [len(block) for block in corners])
+    first_facet = np.cumsum([0] + [len(block) for block in nodes_by_type])
     for row in np.flatnonzero((nodes[:, :, None] != nodes_inside[:, None]).all(axis=(1, 2))):
         kind = int(np.searchsorted(first_facet, inside.facet[row], side="right")) - 1
-        on_facet = closest_of_kinds(positions[[row]], [corners[kind][[inside.facet[row] - first_facet[kind]]]])
+        on_facet = closest_of_kinds(positions[[row]], [nodes_by_type[kind][[inside.facet[row] - first_facet[kind]]]])
         for values, value in zip(near, on_facet, strict=True):
             values[row] = value[0]
         near.facet[row] = inside.facet[row]

@@ -10,7 +10,7 @@ import numpy as np
 from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.projection import CORNER, nodal_normals
-from fastcontact.contact.side_checks import shared_facets
+from fastcontact.contact.side_checks import nodes_of_shared_facets
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
@@ -32,8 +32,8 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
         )
     else:
         for facing, opposite in ((other.secondary, other.primary), (other.primary, other.secondary)):
-            nodes = shared_facets(mesh, pair.secondary, facing)
-            if len(nodes) and len(shared_facets(mesh, pair.primary, opposite)):
+            nodes = nodes_of_shared_facets(mesh, pair.secondary, facing)
+            if len(nodes) and len(nodes_of_shared_facets(mesh, pair.primary, opposite)):
                 raise ContactError(
                     f"contact '{pair.name}' pairs facets of '{pair.secondary}' and '{pair.primary}' that are also paired by "
                     f"contact '{other.name}': '{pair.secondary}' and '{facing}' share facets with {len(nodes)} nodes "
@@ -50,7 +50,7 @@ def share_facets(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool
     if other.obstacle is not None:
         return False
     roles = (other.secondary, other.primary), (other.primary, other.secondary)
-    return any(all(len(shared_facets(mesh, *groups)) for groups in zip(sides, role)) for role in roles)
+    return any(all(len(nodes_of_shared_facets(mesh, *groups)) for groups in zip(sides, role)) for role in roles)
 
 
 def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
@@ -62,7 +62,7 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
         return
     if any(getattr(pair, key) != getattr(other, key) for key in ("motion", "ramp", "rotation", "rotation_ramp")):
         return
-    nodes = shared_facets(mesh, pair.secondary, other.secondary)
+    nodes = nodes_of_shared_facets(mesh, pair.secondary, other.secondary)
     if not len(nodes):
         return
     points = mesh.points[nodes]

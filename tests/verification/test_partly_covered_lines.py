@@ -6,7 +6,7 @@ from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.formulations.mortar import DETERMINED, WholeFacets, independent_values
+from fastcontact.contact.formulations.mortar import DETERMINED, CompleteFacets, independent_values
 from fastcontact.mesh.generate import block
 
 pytestmark = pytest.mark.each_value
@@ -59,7 +59,7 @@ def test_fields_are_as_rich_as_what_takes_part_determines(element, axisymmetric)
     model.add_material(fc.LinearElastic(1.0, 0.0))
     model.add_contact("pair", secondary="L_TOP", primary="U_BOTTOM", formulation="mortar")
     side = model.bind(model.contact[0]).secondary
-    whole = WholeFacets.of(side.blocks[0], model.mesh.points, axisymmetric)
+    whole = CompleteFacets.of(side.blocks[0], model.mesh.points, axisymmetric)
     k, rng = side.only_block.local.shape[1], np.random.default_rng(3)
     for _ in range(50):
         s, w = np.polynomial.legendre.leggauss(6)

@@ -128,7 +128,7 @@ class Eliminated:
             free = cone_newton.rotated(self._rotation, free)
             compliance = self._compliance_of_rows(rows, unknown_compliance)
         held_slips = cone_newton.held_tangents(compliance)
-        prescribed = held_slips & constraints.moved_past(np.arange(m), self._rotation)
+        prescribed = held_slips & constraints.imposes_slip(np.arange(m), self._rotation)
         self._compliance[1:] += np.where(prescribed, cone_newton.SLIP_COMPLIANCE * compliance[0, 0], 0.0)
         slip_rows = [scaled(T, np.where(is_held, 0.0, 1.0)) for T, is_held in zip(rows[1:], held_slips, strict=True)]
         self._rows = (rows[0], *slip_rows)

@@ -164,7 +164,7 @@ def _with_included(
         free, y0, closing = (rotated(Q, values) for values in (free, y0, closing))
         guess = None if guess is None else rotated(Q, guess)
     if len(held_rows):
-        prescribed = held_slips & constraints.moved_past(rows, Q)
+        prescribed = held_slips & constraints.imposes_slip(rows, Q)
         F[held_rows], F[:, held_rows] = 0.0, 0.0
         F[held_rows, held_rows] = np.where(prescribed, SLIP_COMPLIANCE * C[0, 0], np.diag(F).max())[held_slips]
         free[1:][held_slips & ~prescribed] = 0.0

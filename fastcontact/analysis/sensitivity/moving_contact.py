@@ -119,8 +119,8 @@ class MovingContact:
     def step(self) -> float:
         """Increment by which points are moved [length]."""
         points = self.problem.model.mesh.points
-        facets = [corners for side in self._surfaces() for corners in side.corners(points)]
-        sizes = [float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()) for corners in facets]
+        facets = [nodes for side in self._surfaces() for nodes in side.node_positions(points)]
+        sizes = [float(np.linalg.norm(np.ptp(nodes, axis=1), axis=1).min()) for nodes in facets]
         return DIFFERENCES * min(sizes, default=np.inf)
 
     def _surfaces(self) -> list[Surface]:

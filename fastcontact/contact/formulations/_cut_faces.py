@@ -54,7 +54,7 @@ def face_overlap(
     secondary_polygons = [_Polygons.of(block, deformed) for block in secondary.blocks]
     primary_polygons = [_Polygons.of(block, deformed) for block in primary.blocks]
     centres = np.concatenate([polygons.origin for polygons in secondary_polygons])
-    distance = closest_of_kinds(centres, primary.corners(deformed)).distance
+    distance = closest_of_kinds(centres, primary.node_positions(deformed)).distance
     axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
     masses, couplings, depths, offset = [], [], [], 0
     for of_secondary in secondary_polygons:

@@ -315,7 +315,7 @@ def _symmetrise(mass):
 def integrate(
     low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
     primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
-    factor, mass, coupling, closer,
+    factor, mass, coupling, gap_reduction,
 ):  # fmt: skip
     """Integrate products of shape functions over the segments of the secondary facets `low` to ``high - 1``.
 
@@ -351,7 +351,7 @@ def integrate(
         Filled with integrals of products of two secondary shape functions over each segment [area].
     coupling : (n_pairs, n_nodes, n_other_nodes)
         Filled with integrals of secondary times primary shape functions [area].
-    closer : (n_facets, n_nodes)
+    gap_reduction : (n_facets, n_nodes)
         Filled with integrals of secondary shape functions times the sum of both heights [volume].
 
     Returns
@@ -364,7 +364,7 @@ def integrate(
     n, m = to_terms.shape[0], other_to_terms.shape[0]
     terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
     flat, other_flat, xi, other_xi = np.empty((n, 2)), np.empty((m, 2)), np.empty(2), np.empty(2)
-    mass[start[low] : start[high]], coupling[start[low] : start[high]], closer[low:high] = 0.0, 0.0, 0.0
+    mass[start[low] : start[high]], coupling[start[low] : start[high]], gap_reduction[low:high] = 0.0, 0.0, 0.0
     exact = n == 3 and m == 3
     for i in range(start[low], start[high]):
         s, p = pairs[i, 0], pairs[i, 1]
@@ -395,6 +395,6 @@ def integrate(
                     rise = factor[i, 0] * _height(heights[s], xi)
                     rise += factor[i, 1] * _height(other_heights[p], other_xi)
                     for a in range(n):
-                        closer[s, a] += area * rise * shape[a]
+                        gap_reduction[s, a] += area * rise * shape[a]
     _symmetrise(mass[start[low] : start[high]])
     return -1

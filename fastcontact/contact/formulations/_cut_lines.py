@@ -63,11 +63,11 @@ def line_points(
     weight = (0.5 * (end - begin)[:, None] * w).ravel()
     facet = np.repeat(facet, len(w))
     element = elements.get(block.element)
-    corners, shape = reference[block.facets[facet]], element.shape(xi[:, None])
-    tangent = np.einsum("nk,nkd->nd", element.gradient(xi[:, None])[:, :, 0], corners)
+    nodes, shape = reference[block.facets[facet]], element.shape(xi[:, None])
+    tangent = np.einsum("nk,nkd->nd", element.gradient(xi[:, None])[:, :, 0], nodes)
     area = np.linalg.norm(tangent, axis=1) * weight
     if axisymmetric:
-        area *= 2 * np.pi * np.maximum(np.einsum("nk,nk->n", shape, corners[:, :, 0]), 0.0)
+        area *= 2 * np.pi * np.maximum(np.einsum("nk,nk->n", shape, nodes[:, :, 0]), 0.0)
     return LinePoints(facet, xi, shape, area)
 
 

@@ -34,11 +34,11 @@ COVERED = 0.02
 # Covered fractions above this multiple of the largest one count as equal to it, because on curved facets the fractions of
 # fully covered functions differ by a few percent.
 EQUAL = 0.9
-# Dual functions count as ill conditioned if the root mean square of one of them exceeds MOST, or if the integral of one of
-# them is less than LEAST times its weight. Dual functions of complete facets have root mean squares up to 2.4 (nine nodes).
-# If the nodes of one edge have no dual functions, the integrals of the dual functions of the other corners are 0.21 times
-# their weights on eight-node quadrangles, and zero on six-node triangles.
-MOST, LEAST = 20.0, 0.1
+# Dual functions count as ill conditioned if the root mean square of one of them exceeds LARGEST_RMS, or if the integral of
+# one of them is less than LEAST times its weight. Dual functions of complete facets have root mean squares up to 2.4 (nine
+# nodes). If the nodes of one edge have no dual functions, the integrals of the dual functions of the other corners are 0.21
+# times their weights on eight-node quadrangles, and zero on six-node triangles.
+LARGEST_RMS, LEAST = 20.0, 0.1
 
 
 @cache
@@ -86,7 +86,7 @@ def dual_functions(mass: Array, admissible: Mask, fraction: Array) -> tuple[Arra
     ----------
     mass : ndarray (n_facets, k, k)
         Integrals of products of the positive shape functions over the covered part [area].
-    kept : ndarray of bool (n_facets, k)
+    admissible : ndarray of bool (n_facets, k)
         Functions that may have a dual function.
     fraction : ndarray (n_facets, k)
         Integral of each function over the covered part, relative to its integral over the complete facet [-].
@@ -94,7 +94,7 @@ def dual_functions(mass: Array, admissible: Mask, fraction: Array) -> tuple[Arra
     Returns
     -------
     dual, D : ndarray (n_facets, k, k)
-        Coefficients and integrals of the dual functions, described for `biorthogonal`.
+        Coefficients and integrals of the dual functions, see `biorthogonal`.
     """
     with_dual = admissible & (fraction > 0.0)
     dual, D = biorthogonal(mass, with_dual)
@@ -114,7 +114,7 @@ def dual_functions(mass: Array, admissible: Mask, fraction: Array) -> tuple[Arra
 
 
 def _well_conditioned(dual: Array, mass: Array, with_dual: Mask) -> Mask:
-    """Return for which facets (n_facets,) the dual functions are well conditioned according to MOST and LEAST.
+    """Return for which facets (n_facets,) the dual functions are well conditioned according to LARGEST_RMS and LEAST.
 
     `dual` is the first result of `biorthogonal` for `mass` and `with_dual`.
     """
@@ -124,7 +124,7 @@ def _well_conditioned(dual: Array, mass: Array, with_dual: Mask) -> Mask:
         # The dual functions sum to one if all coefficients of their sum are one.
         deviation = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)
     sufficient = (_sufficient(dual, mass) | ~with_dual).all(axis=1)
-    return ((root_mean_square <= MOST) & (deviation <= LENGTH_ROUND_OFF) & sufficient) | ~with_dual.any(axis=1)
+    return ((root_mean_square <= LARGEST_RMS) & (deviation <= LENGTH_ROUND_OFF) & sufficient) | ~with_dual.any(axis=1)
 
 
 def _sufficient(dual: Array, mass: Array) -> Mask:

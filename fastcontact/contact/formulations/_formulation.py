@@ -50,7 +50,7 @@ from fastcontact.contact.pairing import (
     with_secondary_normals,
 )
 from fastcontact.contact.projection import (
-    BESIDE,
+    SMALL_OVERHANG,
     interpolate,
     nodal_normals,
     places,
@@ -143,7 +143,7 @@ class Formulation(ABC):
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
         if self.projection_tolerance is None:
-            self.projection_tolerance = BESIDE if self.points.shape[1] == 2 else OVERHANG
+            self.projection_tolerance = SMALL_OVERHANG if self.points.shape[1] == 2 else OVERHANG
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
         if self.surface_smoothing and not isinstance(self.primary, Surface):
@@ -271,7 +271,7 @@ class Formulation(ABC):
 
     @cached_property
     def shortest_edge(self) -> float:
-        """Length of the shortest facet, over the order of its shape functions [length]."""
+        """Length of the shortest facet, divided by the order of its shape functions [length]."""
         sizes = [
             np.linalg.norm(np.ptp(self.points[block.facets], axis=1), axis=1) / elements.get(block.element).order
             for block in self.secondary.blocks
@@ -528,7 +528,7 @@ class Formulation(ABC):
         """
         assert self.held is not None
         candidates = Candidates.at(self.secondary.points[nodes])
-        pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, BESIDE))
+        pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         held_primary = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
             rows = np.flatnonzero(pairing.paired)
@@ -556,7 +556,7 @@ class Formulation(ABC):
         nodes = np.flatnonzero(np.isin(self.secondary.points, self.held.restrained))
         if len(nodes):
             candidates = Candidates.at(self.secondary.points[nodes])
-            pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, BESIDE))
+            pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
             rows = rows_along(pairing.normal, candidates, pairing, self.primary, self.points.size)
             size, remaining = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ self.held.motion))
             across[nodes] = pairing.paired & (remaining < 0.25 * size)
@@ -702,7 +702,7 @@ class Formulation(ABC):
             Unit normals of the primary side [-].
         """
         nodes = self.at_nodes
-        pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, BESIDE))
+        pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if self.smoothing is not None:
             gap0 -= self.smoothing_overlap(nodes, pairing, config)

@@ -4,9 +4,9 @@ There are two mortar methods. In 3D, or with dual multipliers, each secondary no
 `_weighted_mortar`. In 2D with standard multipliers, the contact status is determined at integration points. This module
 contains the second method.
 
-In each pairing the secondary facets are divided into segments, see `_cut_lines`, and each
-segment has Gauss points (Puso and Laursen, 2004). The integrals are thus exact, and a uniform pressure is transmitted
-exactly between non-matching meshes. Neither node-to-segment contact nor quadrature over complete facets achieves this.
+In each pairing the secondary facets are divided into segments with Gauss points, see `_cut_lines` (Puso and Laursen, 2004).
+The integrals are thus exact, and a uniform pressure is transmitted exactly between non-matching meshes. Neither
+node-to-segment contact nor quadrature over complete facets achieves this.
 
 Segments without an opposite facet carry no pressure, and the pressure field is projected over the other segments. If the
 primary surface ends within a secondary facet, the pressure ends at this point. The pressure at an integration point and the
@@ -50,14 +50,14 @@ DETERMINED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class WholeFacets:
+class CompleteFacets:
     """Mass matrices of the complete facets of a block, which have k nodes each.
 
     Attributes
     ----------
     block : FacetBlock
     to_corners : ndarray (n_corners, k)
-        Coefficients that express the linear shape functions of the corners by the k shape functions of the facet [-].
+        Coefficients of the linear shape functions of the corners in terms of the k shape functions of the facet [-].
     mass : ndarray (n_facets, k, k)
         Integrals of products of two shape functions over each facet [area].
     """
@@ -67,7 +67,7 @@ class WholeFacets:
     mass: Array
 
     @classmethod
-    def of(cls, block: FacetBlock, points: Array, axisymmetric: bool) -> WholeFacets:
+    def of(cls, block: FacetBlock, points: Array, axisymmetric: bool) -> CompleteFacets:
         """Integrate over the facets of a block at reference `points` (n_points, dim) [length]."""
         element = elements.get(block.element)
         N, dA = areas_of_rule(block, points, axisymmetric)
@@ -97,14 +97,14 @@ def _smallest_eigenvalues(full: Array, mass: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
 
-def independent_values(side: Surface, field: WholeFacets, mass: Array, excluded: Mask) -> tuple[csr_array, Indices]:
+def independent_values(side: Surface, field: CompleteFacets, mass: Array, excluded: Mask) -> tuple[csr_array, Indices]:
     """Return the map from the independent values of the field to all nodal values, and the nodes of the independent values.
 
     Parameters
     ----------
     side : Surface
         The secondary side, with m nodes.
-    field : WholeFacets
+    field : CompleteFacets
         Mass matrices of the complete facets.
     mass : ndarray (n_facets, n_nodes, n_nodes)
         Integrals of products of two shape functions over the covered part of each facet [area].
@@ -135,7 +135,7 @@ def independent_values(side: Surface, field: WholeFacets, mass: Array, excluded:
 
 
 def _with_interpolated_rows(
-    values: csr_array, field: WholeFacets, local: Indices, with_value: Mask, excluded: Mask
+    values: csr_array, field: CompleteFacets, local: Indices, with_value: Mask, excluded: Mask
 ) -> csr_array:
     """Return the map `values` (m, m) with rows added for nodes that are neither independent nor excluded.
 
@@ -150,11 +150,11 @@ def _with_interpolated_rows(
     count = np.bincount(row, minlength=m)
     values = csr_array(diags_array(has_value.astype(float)) @ values)
     values = csr_array(values + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
-    between = lil_array((m, m))
+    interpolation = lil_array((m, m))
     for facet, k in zip(*np.nonzero(~has_value[local[:, corners.shape[1] :]]), strict=True):
         # The facets on both sides of an edge have the same row.
-        between[local[facet, corners.shape[1] + k], corners[facet]] = field.to_corners[:, corners.shape[1] + k]
-    return csr_array(values + csr_array(between) @ values)
+        interpolation[local[facet, corners.shape[1] + k], corners[facet]] = field.to_corners[:, corners.shape[1] + k]
+    return csr_array(values + csr_array(interpolation) @ values)
 
 
 @dataclass(eq=False)
@@ -181,11 +181,11 @@ class SegmentMortar(PressureFieldFormulation):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.n_gauss is not None and self.n_gauss < 2:
-            raise ContactError(f"n_gauss = {self.n_gauss} points per piece do not integrate it exactly: use at least 2")
+            raise ContactError(f"n_gauss = {self.n_gauss} points per segment do not integrate exactly: use at least 2")
         block, (xi, weights) = self.secondary.only_block, quadrature.gauss_line(3)
         lengths = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
         self._borders = _excluded_borders(block, self.excluded)
-        self._whole = WholeFacets.of(block, self.points, self.axisymmetric)
+        self._whole = CompleteFacets.of(block, self.points, self.axisymmetric)
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     @classmethod

@@ -1,7 +1,7 @@
 """Facets of a rigid surface: orientation, adjacency and averaged normals.
 
-Facets are numbered through blocks of one element type each. A ridge is the common boundary of two facets: the end of a
-line in 2D, and the edge of a face in 3D.
+Each block contains the facets of one element type, and facets are numbered consecutively through all blocks. A ridge is an
+end of a line in 2D, and an edge of a face in 3D. Adjacent facets share a ridge.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from fastcontact.mesh.topology import outer_facets, same_facets
 class SurfaceFacets(NamedTuple):
     """The facets of a rigid surface and their normals.
 
-    The smooth normal of a facet at a node is the mean over the facets at this node whose angle to the facet is at most the
-    crease angle, weighted by the angles of the facets (Thuermer and Wuethrich, 1998). k is the largest number of nodes of a
-    facet, see `Surface.all_facets`.
+    The smooth normal of a facet at a node is the mean of the normals of those facets at the node that meet the facet at the
+    crease angle or less, weighted by their interior angles at the node (Thuermer and Wuethrich, 1998). k is the largest
+    number of nodes of a facet, see `Surface.all_facets`.
     """
 
     side: Surface
@@ -48,22 +48,23 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
 
 
 def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:
-    """Return the facets of a group, as oriented in the mesh or, with `flip`, the opposite way, and their cell numbers.
+    """Return the facets of a group and their cell numbers. With `flip`, the orientation of all facets is reversed.
 
-    Facets on the outside of solid cells point out of these cells, independently of the order of their nodes in the group.
+    Before that, facets on the outside of solid cells point out of these cells, independently of the order of their nodes in
+    the group.
     """
-    rows = mesh.split(mesh.cell_groups[group]) if mesh.cells_of(group, dim=mesh.dim - 1) else {}
-    rows = {name: block for name, block in rows.items() if elements.get(name).dim == mesh.dim - 1}
-    if not rows:
+    by_type = mesh.split(mesh.cell_groups[group]) if mesh.cells_of(group, dim=mesh.dim - 1) else {}
+    by_type = {name: rows for name, rows in by_type.items() if elements.get(name).dim == mesh.dim - 1}
+    if not by_type:
         raise ContactError(
             f"group '{group}' contains no facets (cells of dimension {mesh.dim - 1}), so it is not a rigid surface: "
             "name a group of lines in 2D, of triangles or quadrangles in 3D"
         )
     outer = outer_facets(mesh) if mesh.solids else {}
-    points = np.unique(np.concatenate([mesh.cells[name][block].ravel() for name, block in rows.items()]))
+    points = np.unique(np.concatenate([mesh.cells[name][rows].ravel() for name, rows in by_type.items()]))
     blocks = []
-    for name, block in rows.items():
-        facets = mesh.cells[name][block]
+    for name, rows in by_type.items():
+        facets = mesh.cells[name][rows]
         if name in outer:  # facets of solids are oriented outwards
             outer_rows = same_facets(outer[name], facets)
             facets = np.where((outer_rows >= 0)[:, None], outer[name][outer_rows], facets)
@@ -74,10 +75,10 @@ def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:
         degenerate = np.flatnonzero(~(lengths.min(axis=1) > 0.0))
         if len(degenerate):
             raise ContactError(
-                f"{_description(mesh, int(block[degenerate[0]]) + mesh.offsets[name])} of the rigid surface '{group}' has no "
+                f"{_description(mesh, int(rows[degenerate[0]]) + mesh.offsets[name])} of the rigid surface '{group}' has no "
                 "area, or none at one of its nodes: remove it or repair the mesh there"
             )
-    numbers = np.concatenate([block + mesh.offsets[name] for name, block in rows.items()])
+    numbers = np.concatenate([rows + mesh.offsets[name] for name, rows in by_type.items()])
     return Surface(group, tuple(blocks), points, np.zeros(len(points))), numbers
 
 
@@ -90,9 +91,11 @@ def _description(mesh: Mesh, number: int) -> str:
 
 
 def _border(mesh: Mesh, side: Surface, numbers: Indices) -> Mask:
-    """Return the nodes (m,) of ridges that belong to one facet only; `numbers` are the cell numbers of facets.
+    """Return whether the surface ends at its nodes (m,); `numbers` are the cell numbers of the facets.
 
-    Raises ContactError, which names a facet, if the surface branches or neighbours have opposite orientations.
+    It ends at ridges that belong to one facet only.
+
+    Raises ContactError, with the number of a facet, if the surface branches or adjacent facets have opposite orientations.
     """
     facet, nodes, sign = _ridges(side)
     _, ridge, count = np.unique(nodes[:, :2], axis=0, return_inverse=True, return_counts=True)
@@ -103,8 +106,8 @@ def _border(mesh: Mesh, side: Surface, numbers: Indices) -> Mask:
             f"{_description(mesh, int(numbers[facet[branches[0]]]))} of the rigid surface '{side.group}' shares an edge with "
             "more than one other facet: a surface must not branch, so split it into several groups"
         )
-    shared = np.argsort(ridge, kind="stable")
-    first, second = shared[count[ridge[shared]] == 2].reshape(-1, 2).T
+    by_ridge = np.argsort(ridge, kind="stable")
+    first, second = by_ridge[count[ridge[by_ridge]] == 2].reshape(-1, 2).T
     _check_orientation(mesh, side, numbers, facet[first], facet[second], sign[first] != sign[second])
     on_border = np.zeros(len(side.points), bool)
     on_border[nodes[count[ridge] == 1]] = True
@@ -114,7 +117,7 @@ def _border(mesh: Mesh, side: Surface, numbers: Indices) -> Mask:
 def _ridges(side: Surface) -> tuple[Indices, Indices, Indices]:
     """Return the facet (n,), the nodes (n, 3) and the orientation (n,) of all ridges.
 
-    The nodes are both ends and the middle. Without a node in the middle, an end occurs twice; in 2D all are the same.
+    The nodes are both ends and the middle. An end takes the place of a missing middle node, and in 2D all three are the same.
     """
     facets, nodes, signs, start = [], [], [], 0
     for block in side.blocks:
@@ -123,8 +126,8 @@ def _ridges(side: Surface) -> tuple[Indices, Indices, Indices]:
         sign = np.sign(ridges[..., 1] - ridges[..., 0])
         signs.append((np.broadcast_to([1, -1], sign.shape) if element.dim == 1 else sign).ravel())
         facets.append(np.repeat(start + np.arange(len(ridges)), ridges.shape[1]))
-        first, middles = ridges[..., 0], slice(element.n_corners, element.n_corners + len(element.edges))
-        middle = block.local[:, middles] if element.dim == 2 and element.order == 2 else first
+        end, middles = ridges[..., 0], slice(element.n_corners, element.n_corners + len(element.edges))
+        middle = block.local[:, middles] if element.dim == 2 and element.order == 2 else end
         nodes.append(np.stack([*np.sort(ridges, axis=2).transpose(2, 0, 1), middle], axis=2).reshape(-1, 3))
         start += len(ridges)
     return np.concatenate(facets), np.concatenate(nodes), np.concatenate(signs)

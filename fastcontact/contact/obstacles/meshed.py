@@ -10,11 +10,11 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.obstacles._facets import SurfaceFacets, surface_facets
 from fastcontact.contact.projection import (
-    BESIDE,
+    SMALL_OVERHANG,
     Closest,
-    at_common_edges,
     closest_of_kinds,
     distance_from_edges,
+    facets_containing,
     interpolate,
     places,
 )
@@ -28,10 +28,10 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
-    Normals point out of the obstacle, towards the body. In 2D they point to the right of the direction of a line, in 3D
-    to the side from which the nodes of a face run counter-clockwise. Normals of facets on the outside
-    of solid cells of their mesh point out of these cells. Distances to the closest point of the curved facets are exact.
-    Beyond the border of an open surface there is no contact.
+    Normals must point out of the obstacle, towards the body. In 2D the normal of a line points to its right. In 3D the nodes
+    of a face are in counter-clockwise order, seen from the tip of its normal. Facets on the outside of solid cells are an
+    exception: their normals point out of these cells. Distances from curved facets are exact. Beyond the border of an open
+    surface there is no contact.
 
     Parameters
     ----------
@@ -97,11 +97,11 @@ class MeshedSurface:
             raise ContactError(
                 f"the rigid surface '{self.group}' has {dim} dimensions, but the model {points.shape[1]}"
             )
-        corners = self._facets.side.corners(self.mesh.points)
-        closest = closest_of_kinds(points, corners)
+        nodes_by_type = self._facets.side.node_positions(self.mesh.points)
+        closest = closest_of_kinds(points, nodes_by_type)
         pseudonormal, smooth, on_edge, on_border = self._closest_normals(closest)
         offset = points - closest.position
-        size = np.concatenate([np.linalg.norm(np.ptp(x, axis=1), axis=1) for x in corners])[closest.facet]
+        size = np.concatenate([np.linalg.norm(np.ptp(x, axis=1), axis=1) for x in nodes_by_type])[closest.facet]
         # At touching points, the direction from the closest point is dominated by round-off, and the facet normal is used.
         is_touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
@@ -117,7 +117,7 @@ class MeshedSurface:
         # At a plane of symmetry, the last facet may be inclined to the smooth surface of the full model by up to half the
         # crease angle. Points slightly beyond its border must therefore remain in contact.
         slope = np.tan(np.radians(0.5 * MeshedSurface.crease))
-        beyond_border = on_border & (overhang > BESIDE * size) & (overhang > slope * height)
+        beyond_border = on_border & (overhang > SMALL_OVERHANG * size) & (overhang > slope * height)
         return np.where(beyond_border, np.inf, distance), normal
 
     def _closest_normals(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
@@ -134,9 +134,9 @@ class MeshedSurface:
         pseudonormal, on_border = np.where(at_node[:, None], at_nodes[node], closest.normal), at_node & border[node]
         rows = np.flatnonzero(on_edge & ~at_node)
         if len(rows):
-            point, common, xi_there = at_common_edges(side, facet[rows], xi[rows])
-            others = common != facet[rows][point]
-            beyond = interpolate(normals[common[others]], places(side, common[others], xi_there[others]))
-            np.add.at(pseudonormal, rows[point[others]], beyond)
+            point, adjacent, adjacent_xi = facets_containing(side, facet[rows], xi[rows])
+            others = adjacent != facet[rows][point]
+            other_normals = interpolate(normals[adjacent[others]], places(side, adjacent[others], adjacent_xi[others]))
+            np.add.at(pseudonormal, rows[point[others]], other_normals)
             on_border[rows] = np.bincount(point) == 1
         return pseudonormal, interpolate(smooth[facet], at), on_edge, on_border

@@ -64,9 +64,9 @@ def flat_triangles(n_nodes: int) -> Indices:
     return np.array(_FLAT[n_nodes])
 
 
-def terms(places: Array, n_nodes: int) -> Array:
+def terms(xi: Array, n_nodes: int) -> Array:
     """Return the terms (n, n_nodes) of a facet's polynomial at reference coordinates (n, 2) [-]."""
-    return np.prod(places[:, None] ** _POWERS[None, :n_nodes], axis=2)
+    return np.prod(xi[:, None] ** _POWERS[None, :n_nodes], axis=2)
 
 
 def polynomial_degree(n_nodes: int) -> int:

@@ -27,12 +27,12 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
         bend[i], convex[i] = 0.0, np.inf
         if m == 3:
             continue
-        stray, turn, second = _curvature(terms, i, weights)
+        deviation, turn, second = _curvature(terms, i, weights)
         for d in range(3 if m > 4 else 0):
-            low[i, d], high[i, d] = low[i, d] - stray, high[i, d] + stray
+            low[i, d], high[i, d] = low[i, d] - deviation, high[i, d] + deviation
         extent = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1], high[i, 2] - low[i, 2]
-        if stray >= LENGTH_ROUND_OFF * max(extent):  # otherwise the facet is flat
-            bend[i] = stray
+        if deviation >= LENGTH_ROUND_OFF * max(extent):  # otherwise the facet is flat
+            bend[i] = deviation
         p, q = vector(terms, i, 1), vector(terms, i, 2)
         diagonal = np.sqrt(dot(extent, extent))
         convex[i] = uniqueness_bound(p, q, vector(terms, i, 3)) if m == 4 else _convex(p, q, turn, second, diagonal)
@@ -70,14 +70,14 @@ def _fill_curved(nodes, centre, i, d, to_terms, terms, low, high):
 @inlined_kernel
 def _curvature(terms, i, weights):
     """Return bounds on a facet's deviation from flat triangles, the change of its tangents, and its second derivative."""
-    stray, turn, second = 0.0, 0.0, 0.0
+    deviation, turn, second = 0.0, 0.0, 0.0
     for k in range(3, terms.shape[1]):
         term = vector(terms, i, k)
         length = np.sqrt(dot(term, term))
-        stray += length * weights[0, k]
+        deviation += length * weights[0, k]
         turn += length * weights[1, k]
         second += length * weights[2, k]
-    return stray, turn, second
+    return deviation, turn, second
 
 
 @kernel

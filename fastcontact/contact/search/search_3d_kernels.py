@@ -11,7 +11,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
 @interpretable_kernel
-def closest_facets(points, order, begin, end, facets, domain, numbers, tree, closest_facet):
+def closest_facets(points, order, begin, end, facets, domain, numbers, tree, result):
     """Project points (n, 3) onto their closest facets.
 
     If several facets meet at the closest point, the one with the lowest number is chosen. The arguments are those of
@@ -36,27 +36,27 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
                 top = open_box(tree, box, point, stack, squares, top)
                 continue
             f = box - leaves
-            s, t, trial, square, success, inside = _projected(facets, f, domain, point, reach)
-            if square == np.inf:
+            s, t, candidate, squared_distance, success, inside = _projected(facets, f, domain, point, reach)
+            if squared_distance == np.inf:
                 continue
-            gap = minus(trial, foot)
+            offset = minus(candidate, foot)
             # Facets whose closest points coincide meet there and are equally close.
-            coincide = closest >= 0 and (dot(gap, gap) <= tolerance * tolerance or square == best)
-            if (numbers[f] < numbers[closest]) if coincide else (square < best):
-                closest, best_s, best_t, foot, certain, converged = f, s, t, trial, inside, success
+            coincide = closest >= 0 and (dot(offset, offset) <= tolerance * tolerance or squared_distance == best)
+            if (numbers[f] < numbers[closest]) if coincide else (squared_distance < best):
+                closest, best_s, best_t, foot, certain, converged = f, s, t, candidate, inside, success
                 tolerance = LENGTH_ROUND_OFF * _size(tree.low, tree.high, box)
-            if square < best:
-                best = square
+            if squared_distance < best:
+                best = squared_distance
                 reach = np.sqrt(best) + tolerance
                 reach = (1.0 + ROUND_OFF) * (reach * reach)
-        closest_facet.facet[i], closest_facet.distance[i] = -1, np.nan
+        result.facet[i], result.distance[i] = -1, np.nan
         if closest >= 0:
-            closest_facet.facet[i] = numbers[closest]
-            _write(closest_facet, i, facets, closest, domain, best_s, best_t, point, foot, certain, converged)
+            result.facet[i] = numbers[closest]
+            _write(result, i, facets, closest, domain, best_s, best_t, point, foot, certain, converged)
 
 
 @inlined_kernel
-def _write(closest, i, facets, f, domain, s, t, point, foot, inside, converged):
+def _write(result, i, facets, f, domain, s, t, point, foot, inside, converged):
     """Fill the results for point `i`, except the number of the facet `f`."""
     if inside:
         a, b, c = vector(facets.terms, f, 1), vector(facets.terms, f, 2), _twist(facets.terms, f)
@@ -64,17 +64,17 @@ def _write(closest, i, facets, f, domain, s, t, point, foot, inside, converged):
     else:
         s, t = onto_sides(domain.sides, s, t)
         normal, overhang = frame(facets.terms, f, s, t, point, domain.sides, domain.nodes)
-    gap = minus(point, foot)
-    closest.xi[i, 0], closest.xi[i, 1], closest.overhang[i] = s, t, overhang
+    offset = minus(point, foot)
+    result.xi[i, 0], result.xi[i, 1], result.overhang[i] = s, t, overhang
     if converged and np.isfinite(normal[0]):
-        closest.distance[i] = np.sqrt(dot(gap, gap))
+        result.distance[i] = np.sqrt(dot(offset, offset))
     for d in range(3):
-        closest.normal[i, d], closest.position[i, d] = normal[d], foot[d] + facets.centre[d]
+        result.normal[i, d], result.position[i, d] = normal[d], foot[d] + facets.centre[d]
 
 
 @inlined_kernel
 def _twist(terms, f):
-    """Return the term s t of a facet of three or four nodes."""
+    """Return the coefficient of the term s t of a facet with three or four nodes."""
     return vector(terms, f, 3) if terms.shape[1] > 3 else (0.0, 0.0, 0.0)
 
 
@@ -82,7 +82,7 @@ def _twist(terms, f):
 def _projected(facets, f, domain, point, reach):
     """Return (s, t) of the closest point of facet `f`, the point, and its squared distance, infinite if out of reach.
 
-    Two flags follow: whether the projection converged, and whether it certainly lies inside the facet.
+    The last two results are whether the projection converged, and whether it certainly lies inside the facet.
     """
     terms = facets.terms
     if terms.shape[1] <= 4:
@@ -95,15 +95,15 @@ def _projected(facets, f, domain, point, reach):
             s, t, d = on_bilinear(r, a, b, c, np.sqrt(reach))
             inside = abs(s) < 1.0 and abs(t) < 1.0
         foot = along(along(along(o, a, s), b, t), c, s * t)
-        gap = minus(point, foot)
+        offset = minus(point, foot)
         if d == np.inf:
             return s, t, foot, np.inf, True, False
-        if terms.shape[1] == 3 or (abs(dot(gap, c)) < facets.convex[f] and d >= 0.0):
-            return s, t, foot, dot(gap, gap), True, inside
+        if terms.shape[1] == 3 or (abs(dot(offset, c)) < facets.convex[f] and d >= 0.0):
+            return s, t, foot, dot(offset, offset), True, inside
     s, t, d, converged = project(facets, f, domain, point, reach)
     foot = component(terms, f, 0, s, t)[0], component(terms, f, 1, s, t)[0], component(terms, f, 2, s, t)[0]
-    gap = minus(point, foot)
-    return s, t, foot, np.inf if d == np.inf else dot(gap, gap), converged, False
+    offset = minus(point, foot)
+    return s, t, foot, np.inf if d == np.inf else dot(offset, offset), converged, False
 
 
 @inlined_kernel

@@ -1,8 +1,8 @@
 """Reference solver: conjugate gradients of SciPy, preconditioned by the smoothed aggregation multigrid of pyamg.
 
 This solver is simple and slow. Except for the choice of pivots, it consists only of calls to pyamg and SciPy, so that the
-solver "amg" can be verified against it. Equations are eliminated by the transformation ``u = T v + t``, and each set of
-equations requires a new hierarchy for the matrix ``T.T K T``.
+solver "amg" can be verified against it. Constraints are eliminated by the transformation ``u = T v + t``, and each set of
+constraints requires a new hierarchy for the matrix ``T.T K T``.
 """
 
 from __future__ import annotations
@@ -99,12 +99,12 @@ class Pyamg(LinearSolver):
         t = np.zeros(len(f))
         if elimination is not None:
             t[elimination.pivots] = elimination.offset
-        right = self._T.T @ (f - self.K @ t)
+        rhs = self._T.T @ (f - self.K @ t)
         v0 = None if guess is None else guess - t
         if v0 is not None and elimination is not None:
             v0[elimination.pivots] = 0.0
         v, failed = cg(
-            self._A, right, v0, rtol=max(self.tolerance, tolerance or 0.0), maxiter=MAX_ITERATIONS,
+            self._A, rhs, v0, rtol=max(self.tolerance, tolerance or 0.0), maxiter=MAX_ITERATIONS,
             M=self._hierarchy.aspreconditioner(), callback=self._count,
         )  # fmt: skip
         if failed:

@@ -19,7 +19,7 @@ from fastcontact.elasticity.material_axes import Axes
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.materials import Constant
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
-from fastcontact.elasticity.temperature import Temperature, histories
+from fastcontact.elasticity.temperature import Temperature, temperature_history
 from fastcontact.errors import ModelError
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.loads import ModelLoads
@@ -81,7 +81,7 @@ class ModelInitialStates(ModelLoads):
                 raise ModelError("give either times or ramp for a temperature, not both")
             if not isinstance(checked, np.ndarray) or checked.ndim != 2:
                 raise ModelError("a temperature with times must be an array (n_instants, n_points)")
-            temperatures = histories(names, checked, reference, times)
+            temperatures = temperature_history(names, checked, reference, times)
         else:
             temperatures = [Temperature(names, checked, reference, table_of(ramp, "the ramp of the temperature"))]
         for temperature in temperatures:

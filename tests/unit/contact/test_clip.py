@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.contact.formulations import _cut_faces_kernels
-from fastcontact.contact.formulations._dual_basis import MOST, dual_functions, positive
+from fastcontact.contact.formulations._dual_basis import LARGEST_RMS, dual_functions, positive
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.mesh import elements, quadrature
@@ -306,7 +306,7 @@ def test_on_any_part_of_a_facet_the_functions_sum_to_one_and_stay_moderate(name,
     dual, D = dual_functions(mass, kept, fraction)
     assert dual[0].sum(axis=0) == pytest.approx(1.0, abs=1e-8)  # a uniform pressure is carried on
     assert dual @ mass == pytest.approx(D, abs=1e-8 * area)
-    assert np.sqrt(np.einsum("ab,bc,ac->a", dual[0], mass[0], dual[0]) / area).max() <= MOST
+    assert np.sqrt(np.einsum("ab,bc,ac->a", dual[0], mass[0], dual[0]) / area).max() <= LARGEST_RMS
     taking_part = np.diag(D[0]) > 0
     assert not taking_part[~kept[0]].any()
     among = D[0][np.ix_(taking_part, taking_part)]

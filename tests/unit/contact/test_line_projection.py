@@ -35,7 +35,7 @@ def wavy(element, n=8):
 def projected(candidates, side, points, project=along_normals):
     """Return the normals at the nodes of facets, the closest points, and the projection along the normals."""
     normals = smooth_normals(side, points)
-    start = closest_of_kinds(candidates, side.corners(points))
+    start = closest_of_kinds(candidates, side.node_positions(points))
     return normals, start, project(candidates, side, points, normals, start)
 
 
@@ -213,7 +213,7 @@ def test_where_no_step_is_possible_the_closest_point_stays():
     points, side = rough("hex8", 2, 0.0)
     normals = np.tile([1.0, 0.0, 0.0], (side.n_facets, 4, 1))  # along the facets
     candidates = above(20, beside=-0.1)
-    start = closest_of_kinds(candidates, side.corners(points))
+    start = closest_of_kinds(candidates, side.node_positions(points))
     facet, xi, _, _ = along_normals(candidates, side, points, normals, start)
     assert (facet == start.facet).all()
     assert (xi == start.xi).all()
@@ -257,4 +257,4 @@ def test_reference_coordinates_in_and_beyond_a_facet():
         (False, 0.2, -0.3, 0.0, (0.2, -0.3)), (False, 1.5, 0.0, 0.25, (1.0, 0.0)), (False, -2.0, 3.0, 1.0, (-1.0, 1.0)),
     ):  # fmt: skip
         assert projection_kernels.beyond(triangle, s, t) == pytest.approx(out)
-        assert projection_kernels.inside(triangle, s, t) == pytest.approx(kept)
+        assert projection_kernels.clamped(triangle, s, t) == pytest.approx(kept)
