@@ -48,7 +48,7 @@ class HeatSolution(Temperatures):
     def with_heat_results(self, problem: Problem, step: StepResult) -> StepResult:
         """Return the result of a load step with heat fluxes and heat reactions added."""
         assert problem.heat is not None
-        flux = problem.heat.conductors(step.displacement).flux(self.rise)
+        flux = problem.heat.conduction_at(step.displacement).flux(self.rise)
         with_flux = {name: replace(step.contact[name], heat_flux=power) for name, power in self.fluxes.items()}
         return replace(
             step, contact=step.contact | with_flux, heat_reaction=self.reaction,
@@ -59,7 +59,7 @@ class HeatSolution(Temperatures):
 
 def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Array:
     """Return the initial temperature rise (n_points,) of a load step [temperature]."""
-    if not (heat.depends_on_contact or heat.finite):
+    if not (heat.depends_on_contact or heat.finite_strain):
         return heat.temperatures(instant).rise
     return np.zeros(problem.model.mesh.n_points) if state.rise is None else state.rise
 
@@ -153,7 +153,7 @@ def _steady_temperatures(
         assert constraints.nodal is not None
         link = heat_transfer(constraints, pair.secondary, pair.primary, pair.points.shape)
         area_ratio = np.ones(n)  # ratio of deformed to undeformed area at each node
-        if heat.finite:
+        if heat.finite_strain:
             before, after = areas(pair, displacement)
             area_ratio[pair.secondary.points] = after / before
             link = replace(link, area=link.area * (link.secondary @ area_ratio))

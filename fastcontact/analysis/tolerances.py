@@ -88,7 +88,7 @@ class Tolerances:
             inexact=self.inexact,
         )
 
-    def enough(self, size: float) -> float:
+    def geometry_tolerance(self, size: float) -> float:
         """Return the change of the displacements below which the geometry has converged [length].
 
         `size` is the largest displacement [length].
