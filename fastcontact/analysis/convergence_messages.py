@@ -32,15 +32,13 @@ def geometry_not_converged(problem: Problem, history: list[dict[str, Any]], chan
     """
     last = history[-1]
     magnitude = np.linalg.norm(change.reshape(problem.shape), axis=1)
-    nodes: Nodes = {}
-    for name, pair in problem.pairs.items():
-        points = pair.secondary.points
-        nodes[name] = points[np.argsort(-magnitude[points], kind="stable")[:3]].tolist()
+    sides = {name: pair.secondary.points for name, pair in problem.pairs.items()}
+    nodes = {name: points[np.argsort(-magnitude[points], kind="stable")[:3]].tolist() for name, points in sides.items()}
     last["nodes"] = dict(sorted(nodes.items(), key=lambda item: -magnitude[item[1][0]]))
     changes = [entry["displacement_change"] for entry in history]
-    declining = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
-    size = changes[-1] if declining else max(changes[-WINDOW:])
-    more = ["more updates (Criteria.max_geometry_updates)"] if declining else []
+    decreasing = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
+    size = changes[-1] if decreasing else max(changes[-WINDOW:])
+    more = ["more updates (Criteria.max_geometry_updates)"] if decreasing else []
     advice = [*more, *_advice_for_pairs(problem, last["nodes"])]
     advice.append("a fixed number of updates (Criteria.geometry_updates)")
     if float(f"{size:.0e}") < NOTABLE:  # otherwise `Criteria` refuses it
@@ -51,7 +49,7 @@ def geometry_not_converged(problem: Problem, history: list[dict[str, Any]], chan
         f"the contact geometry did not converge in {limit} updates: the displacement still changes by "
         f"{changes[-1]:.1e} of its largest component, most at "
         f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. "
-        f"{'' if declining else 'These changes do not decrease. '}Use {remedies}"
+        f"{'' if decreasing else 'These changes do not decrease. '}Use {remedies}"
     )
 
 

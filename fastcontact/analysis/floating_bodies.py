@@ -390,13 +390,13 @@ class FloatingBodies:
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
             solution = solve_at(anchor)
-            elongation, iterations = solution.u[springs], iterations + solution.iterations
+            elongation, u_error = solution.u[springs], noise * largest(solution.u)
+            iterations += solution.iterations
             stretch = float(norm(elongation))
             load_stretch = max(load, float(np.abs(solution.multiplier).max(initial=0.0))) / self.stiffness
             # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if
             # prescribed displacements move the bodies), as small as the accuracy of the linear solver allows, or round-off of
             # the elongation before a Newton step.
-            u_error = noise * largest(solution.u)
             slack = stretch <= max(ROUND_OFF * load_stretch, u_error, LENGTH_ROUND_OFF * newton_stretch)
             # If the forces of the springs no longer decrease, a larger tolerance applies.
             if not slack and stretch >= 0.5 * last_stretch and positions > 3:

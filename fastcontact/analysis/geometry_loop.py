@@ -185,8 +185,7 @@ def _settle(
     if increments.due or increments.unfinished:
         del iterate.history[-limit - 1 :]
         return _settle(step, iterate, increments)
-    fixed = limit and not criteria.keep_pairing
-    last_change = (limit, last_update.relative_change) if fixed else None
+    last_change = (limit, last_update.relative_change) if limit and not criteria.keep_pairing else None
     return SettledContact(constraints, solution, iterate, last_change, nodes=nodes)
 
 

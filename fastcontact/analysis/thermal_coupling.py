@@ -108,7 +108,7 @@ def settle_heat(
         rise = mixing.mixed(rise, heat_solution.rise)
         equilibrium = solve(thermal_load(problem, load, rise), equilibrium)
     raise ConvergenceError(
-        f"heat and contact do not converge: after {limit} times temperatures still change by {change:.3g}, for "
+        f"heat and contact do not converge: after {limit} exchanges, temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
         "conductance fall gradually with the gap, or grow from zero with the pressure",
         [] if equilibrium.settled is None else equilibrium.settled.iterate.history,
@@ -140,7 +140,7 @@ def _steady_temperatures(
     settled, u = equilibrium.settled, equilibrium.u
     heat, displacement = problem.heat, problem.displacement(u)
     assert heat is not None
-    n, laws, crossings = problem.model.mesh.n_points, problem.model.conductances(), {}
+    n, laws, conducting = problem.model.mesh.n_points, problem.model.conductances(), {}
     matrix, obstacles = csr_array((n, n)), csr_array((n, n))
     friction_power, obstacle_power = np.zeros((2, n))
     for name, pair in problem.pairs.items():
@@ -167,13 +167,13 @@ def _steady_temperatures(
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
                 obstacles = csr_array(obstacles + link.matrix(h))
                 obstacle_power = obstacle_power + link.secondary.T @ (h * link.area * obstacle_rise)
-            crossings[name] = link, constraints.nodal, h, obstacle_rise, area_ratio[pair.secondary.points]
+            conducting[name] = link, constraints.nodal, h, obstacle_rise, area_ratio[pair.secondary.points]
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
-    powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in crossings.items()}
-    fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}
+    powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in conducting.items()}
+    fluxes = {name: conducting[name][1].over_whole_side(power) / conducting[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return HeatSolution(steady.rise, steady.reaction, balance, fluxes)
 

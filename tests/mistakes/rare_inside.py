@@ -205,7 +205,7 @@ CALLS = [
     ("equations that are equal", lambda: pivot_order.block_inverse(csr_array(np.ones((2, 2)))), pivot_order.RepeatedError, REPEATED),
     ("more equations than unknowns", lambda: pivot_order.matched_pivots(csr_array(np.ones((2, 1)))), pivot_order.RepeatedError, REPEATED),
     ("equations that are nearly equal", lambda: pivot_order.block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), pivot_order.RepeatedError, REPEATED),
-    ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): round-off allows no less if moduli or displacements differ by many orders of magnitude\. Put a rigid obstacle in the place of a stiff body"),
+    ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): round-off prevents a smaller one if moduli or displacements differ by many orders of magnitude\. Replace a stiff body by a rigid obstacle"),
     ("springs that stay stretched", not_slack, fc.ConvergenceError, r"contact does not hold .*: after \d+ trial positions, a force of .* is still missing for equilibrium under a load of 10\. Add a support \(step 1 from 0 to 1; more load steps may help\)$"),
     ("benchmarks without checkout", no_checkout, fc.errors.FastcontactError, r"the benchmarks need the source checkout, and there is no '.*': install it with pip install -e"),
     ("outputs without matplotlib", no_matplotlib_for_outputs, fc.errors.FastcontactError, r"pictures need matplotlib: pip install 'fastcontact\[plot\]'"),
