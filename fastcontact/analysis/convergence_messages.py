@@ -24,7 +24,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 Nodes = dict[str, list[int]]
 
 
-def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
+def geometry_not_converged(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
     """Return the message for a contact geometry that did not converge.
 
     `change` (n_dofs,) is the change of the displacements in the last update [length]. The nodes with the largest changes, by
@@ -32,26 +32,24 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     """
     last = history[-1]
     magnitude = np.linalg.norm(change.reshape(problem.shape), axis=1)
-    nodes: Nodes = {}
-    for name, pair in problem.pairs.items():
-        points = pair.secondary.points
-        nodes[name] = points[np.argsort(-magnitude[points], kind="stable")[:3]].tolist()
+    sides = {name: pair.secondary.points for name, pair in problem.pairs.items()}
+    nodes = {name: points[np.argsort(-magnitude[points], kind="stable")[:3]].tolist() for name, points in sides.items()}
     last["nodes"] = dict(sorted(nodes.items(), key=lambda item: -magnitude[item[1][0]]))
     changes = [entry["displacement_change"] for entry in history]
-    declining = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
-    size = changes[-1] if declining else max(changes[-WINDOW:])
-    more = ["more updates (Criteria.max_geometry_updates)"] if declining else []
+    decreasing = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
+    size = changes[-1] if decreasing else max(changes[-WINDOW:])
+    more = ["more updates (Criteria.max_geometry_updates)"] if decreasing else []
     advice = [*more, *_advice_for_pairs(problem, last["nodes"])]
     advice.append("a fixed number of updates (Criteria.geometry_updates)")
     if float(f"{size:.0e}") < NOTABLE:  # otherwise `Criteria` refuses it
         criterion = f"Criteria.geometry, which is {problem.criteria.geometry:g}, above {size:.0e}"
         advice.append(f"accept changes of that size ({criterion})")
-    use = " or ".join(filter(None, [", ".join(advice[:-1]), advice[-1]]))
+    remedies = " or ".join(filter(None, [", ".join(advice[:-1]), advice[-1]]))
     return (
         f"the contact geometry did not converge in {limit} updates: the displacement still changes by "
         f"{changes[-1]:.1e} of its largest component, most at "
         f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. "
-        f"{'' if declining else 'These changes do not decline. '}Use {use}"
+        f"{'' if decreasing else 'These changes do not decrease. '}Use {remedies}"
     )
 
 
@@ -74,25 +72,28 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
 
 
 def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> str:
-    """Return the message for loads that move `bodies`, which `factor` times the friction `coefficients` would hold."""
+    """Return the message for loads that move `bodies`.
+
+    To hold the bodies, the friction `coefficients` would have to be `factor` times as large.
+    """
     distinct = np.unique(coefficients[coefficients > 0.0])
-    pairs = (factor, 1.0), (factor * distinct[0], distinct[0])
-    digits = next((n for n in range(3, 12) if all(f"{a:.{n}g}" != f"{b:.{n}g}" for a, b in pairs)), 12)
+    compared = (factor, 1.0), (factor * distinct[0], distinct[0])
+    digits = next((n for n in range(3, 12) if all(f"{a:.{n}g}" != f"{b:.{n}g}" for a, b in compared)), 12)
     needed = (
         f"a coefficient of about {factor * distinct[0]:.{digits}g} where the largest is {distinct[0]:.{digits}g}"
         if np.isclose(distinct[0], distinct[-1])
         else f"about {factor:.{digits}g} times the coefficients given, which are from {distinct[0]:.3g} to {distinct[-1]:.3g}"
     )
-    held, more = "cannot hold", ""
+    verb, elastic_remark = "cannot hold", ""
     if factor < 1.0:
-        held, more = "hardly holds", ", if the bodies were rigid, and more for elastic bodies"
+        verb, elastic_remark = "hardly holds", ", if the bodies were rigid, and more for elastic bodies"
     return (
-        f"friction {held} {', '.join(bodies)} against the loads: this would require {needed}{more}. Lower "
+        f"friction {verb} {', '.join(bodies)} against the loads: this would require {needed}{elastic_remark}. Lower "
         "the loads along the contact, press harder, or support the bodies along the contact"
     )
 
 
-def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, friction: bool, gaps: Array) -> str:
+def not_restrained(bodies: FloatingBodies, rigid: RigidPosition, load: float, friction: bool, gaps: Array) -> str:
     """Return the message for floating bodies whose springs still carry forces.
 
     Parameters
@@ -116,13 +117,13 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
             )
     remedy = "Add a support or more friction, for which the loads may be too large" if friction else "Add a support"
     return (
-        f"contact does not hold {grouped(bodies.moving(rigid))}: after {rigid.positions} positions "
-        f"tried, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium"
+        f"contact does not hold {grouped(bodies.moving(rigid))}: after {rigid.positions} trial "
+        f"positions, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium"
         f"{f' under a load of {load:.3g}' if load else ''}. {remedy}"
     )
 
 
-def limit_load(problem: Problem, state: State) -> str:
+def limit_load_note(problem: Problem, state: State) -> str:
     """Return the end of the message of a load step that fails after `state` if bodies yield, otherwise an empty string."""
     strain = max((largest(values[..., PLASTIC_STRAIN]) for values in state.history.values()), default=0.0)
     if not strain:
@@ -139,7 +140,7 @@ def limit_load(problem: Problem, state: State) -> str:
     )
 
 
-def friction_used(problem: Problem, state: State) -> str:
+def friction_note(problem: Problem, state: State) -> str:
     """Return the end of the message of a load step that fails after `state` if floating bodies nearly slide."""
     if problem.floating_bodies is None:
         return ""
@@ -156,7 +157,7 @@ def friction_used(problem: Problem, state: State) -> str:
 
 
 def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indices) -> Nodes:
-    """Return by contact pair the secondary nodes that are nearest to the constraints `rows`, numbered over all pairs."""
+    """Return by contact pair the secondary nodes nearest to constraints, given by their row numbers over all pairs."""
     nodes: Nodes = {}
     for name, rows_of_pair in constraints.rows.items():
         rows_in_pair = rows[(rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)] - rows_of_pair.start
@@ -178,10 +179,10 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
 
 
 def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
-    """Return the remedy for a bilateral pair, whose constraints close gaps of any width that is not round-off.
+    """Return the remedy for a bilateral pair whose initial gaps exceed round-off, since such pairs close gaps of any width.
 
-    Without such a pair, return remedies for pairs that alternate between facets at a node, supports of dual functions, or
-    branches of a law. Each remedy is for the first such pair of `nodes`, whose displacements change most.
+    Without such a pair, return remedies for pairs that may alternate between facets at a node, supports of dual functions,
+    or branches of a law. Each remedy is for the first such pair in `nodes`, in which displacements change most.
     """
     for name, pair in problem.pairs.items():
         if pair.options.kind == "bilateral":
@@ -192,13 +193,13 @@ def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
     pairs = {name: problem.pairs[name] for name in nodes}
     faceted = [name for name, pair in pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
     laws = {name: pair.options.cohesion for name, pair in pairs.items() if pair.options.cohesion is not None}
-    reach = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
+    ranges = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
     dual = [
         name for name, pair in pairs.items() if getattr(pair, "multipliers", "") == "dual" and len(pair.primary.points)
     ]
-    options = {
+    pairs_by_remedy = {
         'normals="averaged"': faceted, 'multipliers="standard"': dual,
-        f"facets no longer than the reach of adhesion, {min(reach.values(), default=0.0):.3g},": list(reach),
-        "facets shorter than the cohesive zone": [name for name in laws if name not in reach],
+        f"facets no longer than the range of adhesion, {min(ranges.values(), default=0.0):.3g},": list(ranges),
+        "facets shorter than the cohesive zone": [name for name in laws if name not in ranges],
     }  # fmt: skip
-    return [f"{option} for contact {names[0]!r}" for option, names in options.items() if names]
+    return [f"{remedy} for contact {names[0]!r}" for remedy, names in pairs_by_remedy.items() if names]

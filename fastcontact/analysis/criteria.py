@@ -58,7 +58,7 @@ class Criteria:
     friction_while_touching : float, optional
         Load steps in which nodes close and carry more shear than this fraction of the coefficient of friction times the
         normal forces are solved in increments that end where nodes close, with one Delassus operator and with the geometry
-        at the end of the step. Slip is then counted from the instant at which a node closes, otherwise from the beginning of
+        at the end of the step. Slip is then measured from the instant at which a node closes, otherwise from the beginning of
         the step. By default 0.001 in plane and axisymmetric models of linear bodies, at obstacles and between bodies with
         dual mortar multipliers, unless `geometry_updates` is given or only contact restrains a body; elsewhere 1, which
         means that no step is divided. A step takes up to twice the time with the direct solver, more if some dozens of nodes

@@ -241,8 +241,8 @@ class Balance:
             f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
         )
         remedy = "use the direct solver" if problem.solver.iterative else (
-            "round-off allows no less if moduli or displacements differ by many orders of magnitude. Put a rigid obstacle "
-            f"in the place of a stiff body{tolerance_advice}"
+            "round-off prevents a smaller one if moduli or displacements differ by many orders of magnitude. Replace a stiff "
+            f"body by a rigid obstacle{tolerance_advice}"
         )  # fmt: skip
         return ConvergenceError(
             f"step {index}: the out-of-balance force {self.residual:.3g} stays above {self.bound:.3g} "

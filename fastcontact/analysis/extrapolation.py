@@ -14,14 +14,14 @@ from fastcontact.arrays import Array, Mask, largest
 # Gaps (m,) [length] and multipliers (m,) [force] of a pair.
 GapsAndForces = tuple[Array, Array]
 # Largest ratio of the current load increment to the last one at which steps are extrapolated.
-FARTHEST = 2.0
+MAX_RATIO = 2.0
 # Highest degree of the extrapolation polynomial.
-DEGREE = 4
+MAX_DEGREE = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Extrapolation:
-    """The last converged load steps, at most DEGREE + 1, and their extrapolation to the current load.
+    """The last converged load steps, at most MAX_DEGREE + 1, and their extrapolation to the current load.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Extrapolation:
         """
         loads = (*self.loads[-2:], tuple(quantity.copy() for quantity in quantities))
         ratio = _increment_ratio(loads) if len(self.states) >= 2 else 0.0
-        return replace(self, ratios=(*self.ratios[1 - DEGREE :], ratio), loads=loads)
+        return replace(self, ratios=(*self.ratios[1 - MAX_DEGREE :], ratio), loads=loads)
 
     def converged(self, u: Array, contact: Mapping[str, GapsAndForces], curve: bool = False) -> Extrapolation:
         """Return a copy to which the solution of a step is added.
@@ -68,7 +68,7 @@ class Extrapolation:
         while degree < len(distances) - 1 and distances[degree + 1] < DECLINE * distances[degree]:
             degree += 1  # without the factor DECLINE, indentations past yield take 5 % more iterations
         degree = max(1, degree + (degree == highest))
-        return replace(self, degree=degree, states=(*self.states[-DEGREE if curve else -1 :], (u.copy(), contact)))
+        return replace(self, degree=degree, states=(*self.states[-MAX_DEGREE if curve else -1 :], (u.copy(), contact)))
 
     def predicted(self, u: Array, degree: int | None = None) -> Array:
         """Return initial displacements (n,) of a step [length]; without extrapolation `u` (n,).
@@ -152,7 +152,7 @@ def _increment_ratio(loads: tuple[tuple[Array, ...], ...]) -> float:
         increment, last_increment = third - second, second - first
         if squared_norm := float(np.sum(last_increment * last_increment)):
             ratio = float(np.sum(increment * last_increment)) / squared_norm
-            return ratio if 0.0 < ratio <= FARTHEST else 0.0
+            return ratio if 0.0 < ratio <= MAX_RATIO else 0.0
     return 0.0
 
 

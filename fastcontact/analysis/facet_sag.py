@@ -29,8 +29,8 @@ from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import TINY
 
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
-# pressures were 0.2 to 3.2 of the estimate on linear facets, except where contact opens due to the error, and up to 3 on
-# quadratic ones; against rigid shapes, where the value for linear facets applies to all, 1.1 to 1.3.
+# pressures were 0.2 to 3.2 times the estimate on linear facets, except where contact opens due to the error, and up to 3
+# times on quadratic ones; against rigid shapes, where the value for linear facets applies to all, 1.1 to 1.3.
 RELATIVE_ERROR_LIMIT = {1: 0.2, 2: 0.1}
 # Ratio of the estimate to E d / L if the gaps are weighted means: the inverse mass matrix amplifies gaps that alternate from
 # node to node.
@@ -78,7 +78,7 @@ def _inclination(pair: Formulation, configuration: Configuration, contact: Conta
     """Return a warning if facets that are inclined to the smooth surface change friction; an empty string otherwise.
 
     Node-to-segment contact acts along the normals of primary facets. If the nodes of both sides coincide, all facets may be
-    inclined in the same direction relative to the smooth surface, such as the teeth of a ratchet.
+    inclined in the same direction relative to the smooth surface, like the teeth of a ratchet.
     """
     if pair.name != "node_to_segment" or pair.normals != "facet" or not pair.friction:
         return ""

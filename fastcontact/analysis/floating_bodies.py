@@ -2,7 +2,8 @@
 
 Each rigid-body mode that supports leave free gets one spring at one node. The springs are anchored at a position of the
 bodies, so that the contact problem is regular. Its solution stretches the springs, which are then anchored at a new
-position. This is repeated until they carry no force. Each pairing begins at the last position.
+position. This is repeated until they carry no force. After each update of the contact geometry, the iteration starts from the
+last position.
 
 If the matrix is factorised, the linear response of the contact problem to the position is known, and Newton's method finds
 the position at which the springs are slack. Once the contact state no longer changes, one Newton step suffices, whatever
@@ -40,26 +41,27 @@ from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 # Stiffness of soft springs relative to that of the softest body. With a direct solver, springs are as stiff as that body,
-# since soft springs reduce the accuracy (with 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates
-# scatter by 2e-11, and with 1 by 1e-12). With multigrid they are soft, since stiff ones would cost more solutions: with
-# 1e-3, 1e-2 and 1, a stack with friction takes 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. Stiff
+# since soft springs reduce the accuracy of displacements (relative errors are 3e-9 for a wedge with 1e-6, 2e-11 for plates
+# with 1e-3, and 1e-12 with 1). With multigrid, they are soft, since stiff ones would cost more solutions: with 1e-3, 1e-2
+# and 1, a stack with friction takes 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. Stiff
 # springs also compensate the negative stiffness that rotated bodies may have under load. The reference is the softest
 # body, because a contact is not stiffer than the softer one of its bodies (for a layer that is softer by a
 # factor of 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT = 1e-3
 # Largest factor by which elongations may grow in a step in which bodies slide until friction balances the springs. They need
 # not decrease, as the directions of friction change. Without this limit, a blade in a dovetail, half of which is at either
-# end of a cyclic sector, slides to and fro for 40 positions. With a factor of 1 it does so for other friction.
+# end of a cyclic sector, slides to and fro for 40 positions. With a factor of 1, it does so for other coefficients
+# of friction.
 GROWTH = 4.0
 
 
 @dataclass(frozen=True)
 class RigidPosition:
-    """Result of the iteration of rigid positions.
+    """Result of the iteration for the position of floating bodies.
 
     Attributes
     ----------
-    state : Solution
+    solution : Solution
         The last solution, with the number of iterations for all positions.
     anchor : ndarray (k,)
         Displacement at which each spring is anchored [length].
@@ -71,7 +73,7 @@ class RigidPosition:
         Whether the springs are slack: their forces are negligible.
     """
 
-    state: Solution
+    solution: Solution
     anchor: Array
     spring_force: Array
     positions: int
@@ -109,18 +111,18 @@ class PositionResponse:
     def slack_position_change(self, elongation: Array, solution: Solution, last_slide: Array) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact hardly restrains, bodies slide until friction balances the springs, if this change exceeds
-        the elongations. Otherwise they move by the elongations in motions that contact does not restrain at all, and then
-        further until the first gap of the `solution` closes. The norm of the elongations that remain according to the linear
-        response is returned as well; it is infinite if bodies slide, because the linear response does not include sliding.
-        Bodies do not slide back from `last_slide` (k,), the change by which they have just slid; it is zero if they have
-        not. Otherwise a gasket between cyclic flanges slides to and fro for 40 positions.
+        If contact hardly restrains a motion, the bodies slide until friction balances the springs, provided that they slide
+        by more than the elongations. If contact does not restrain a motion at all and the bodies do not slide, they move by
+        the elongations, and then further until the first gap of the `solution` closes. The norm of the elongations that
+        remain according to the linear response is returned as well; it is infinite if bodies slide, because the linear
+        response does not include sliding. Bodies do not slide back from `last_slide` (k,), the change in which they have
+        just slid, or zero. Without this rule, a gasket between cyclic flanges slides to and fro for 40 positions.
         """
-        resolved, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
-        remaining = float(norm(elongation - self.elongation_rates @ resolved))
+        position_error, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
+        remaining = float(norm(elongation - self.elongation_rates @ position_error))
         restrained = remaining <= SINGLE_PRECISION * norm(elongation)
-        # The linear response is more accurate than the least work of friction if it hardly changes the slips.
-        slip_change = largest(self.gap_rates[1:, sliding] @ resolved)
+        # The linear response is more accurate than minimising the work of friction if it hardly changes the slips.
+        slip_change = largest(self.gap_rates[1:, sliding] @ position_error)
         if not restrained or slip_change > NOTABLE * largest(solution.slip[sliding]):
             U, s, V = np.linalg.svd(self.elongation_rates)
             # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for
@@ -129,7 +131,7 @@ class PositionResponse:
             slide = self._slide(V[~firm].T, elongation, solution, sliding)
             if largest(slide) > largest(elongation) and slide @ last_slide >= 0.0:
                 return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
-        change = -resolved
+        change = -position_error
         if not restrained:
             motion = elongation - self._inverse @ (self.elongation_rates @ elongation)
             approach, threshold = -self.gap_rates[0] @ motion, LENGTH_ROUND_OFF * remaining
@@ -157,7 +159,7 @@ class PositionResponse:
         return motions @ amplitudes * (size * (unbalanced <= SINGLE_PRECISION))
 
     def respond(self, force: Array, gaps: Array) -> Array:
-        """Return the `Response` with springs that stay slack."""
+        """Return the change of the unknowns (n,), like a `Response`, if the springs stay slack."""
         u = self.anchored(force, gaps)
         return np.asarray(u - self.unknown_rates @ (self._inverse @ u[self.springs]))
 
@@ -184,7 +186,7 @@ def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: A
         Largest friction forces.
     load : ndarray (z,)
     tangent : ndarray (z, z)
-        Stiffness, of which the part that is not due to the turning of friction forces stores elastic energy.
+        Stiffness. The part that is not due to the rotation of friction forces stores elastic energy.
     """
     from scipy.optimize import minimize
 
@@ -231,7 +233,7 @@ class FloatingBodies:
     Attributes
     ----------
     names : list of str
-        Motions of bodies in the free rigid-body modes.
+        Descriptions of the motions of bodies in the free rigid-body modes.
     dofs : ndarray of int (k,)
         Displacement component to which each spring is attached.
     motions : FreeMotions
@@ -242,7 +244,8 @@ class FloatingBodies:
 
     def __init__(self, motions: FreeMotions, system: System, soft: bool, model_springs: Sequence[Springs]) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
-        # The smallest median of the diagonal over the unknowns that each mode moves, and over those that no mode moves.
+        # Smallest of several medians of the diagonal: one over the unknowns that each mode moves, one over those that no
+        # mode moves.
         solid, moving = system.free & ~weightless, motions.displacement != 0.0
         groups = [solid & group for group in (*moving.T, ~moving.any(axis=1))]
         typical = min(float(np.median(diagonal[group])) for group in groups if group.any())
@@ -284,7 +287,7 @@ class FloatingBodies:
         return np.asarray(self.motions.displacement @ anchor)
 
     def strained(self, u: Array) -> Array:
-        """Return displacements u (n_dofs,) less the rigid-body motion of the springs [length]."""
+        """Return displacements u (n_dofs,) less the rigid-body motion with the same displacements at `dofs` [length]."""
         return u - self.rigid(u[self.dofs])
 
     def position_response(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> PositionResponse:
@@ -321,8 +324,8 @@ class FloatingBodies:
         """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step, by body.
 
         Any position without contact forces is then a solution. Contact forces of sides that just touch are round-off and are
-        ignored: they are negligible compared with the smaller of the loads and the force of a spring that is elongated by
-        the largest displacement; without loads, compared with the latter. Contact forces smaller than the out-of-balance
+        ignored. Such forces are negligible compared with the force of a spring that is elongated by the largest
+        displacement and, if there are loads, also compared with these. Contact forces smaller than the out-of-balance
         forces, which may be large with an iterative solver, are ignored, too.
 
         Parameters
@@ -382,22 +385,23 @@ class FloatingBodies:
         RigidPosition
             The last position, also if the springs do not become slack or if a contact problem does not converge.
         """
-        anchor, last_stretch, iterations, relaxed = start, np.inf, 0, 0.0
+        anchor, last_stretch, iterations, newton_stretch = start, np.inf, 0, 0.0
         step, length, slide_bound = None, 1.0, np.inf
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
-            state = solve_at(anchor)
-            elongation, iterations = state.u[springs], iterations + state.iterations
+            solution = solve_at(anchor)
+            elongation, u_error = solution.u[springs], noise * largest(solution.u)
+            iterations += solution.iterations
             stretch = float(norm(elongation))
-            load_stretch = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
+            load_stretch = max(load, float(np.abs(solution.multiplier).max(initial=0.0))) / self.stiffness
             # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if
             # prescribed displacements move the bodies), as small as the accuracy of the linear solver allows, or round-off of
-            # the elongation that a Newton step has `relaxed`.
-            slack = stretch <= max(ROUND_OFF * load_stretch, noise * largest(state.u), LENGTH_ROUND_OFF * relaxed)
+            # the elongation before a Newton step.
+            slack = stretch <= max(ROUND_OFF * load_stretch, u_error, LENGTH_ROUND_OFF * newton_stretch)
             # If the forces of the springs no longer decrease, a larger tolerance applies.
             if not slack and stretch >= 0.5 * last_stretch and positions > 3:
                 slack = stretch <= max(LENGTH_ROUND_OFF * load_stretch, round_off)
-            if slack or not state.settled or positions == MAX_NEWTON_ITERATIONS:
+            if slack or not solution.settled or positions == MAX_NEWTON_ITERATIONS:
                 break
             if step is not None and length > 0.5**HALVINGS:
                 # Elongations need not decrease when bodies slide.
@@ -411,14 +415,15 @@ class FloatingBodies:
             step, length = None, 1.0
             if stretch > last_stretch:
                 mixing.restart()
-            elif position_response is not None and state.response is not None:
+            elif position_response is not None and solution.response is not None:
                 with suppress(LinAlgError):  # the constraints are linearly dependent
-                    step = position_response(state.response()).slack_position_change(elongation, state, last_slide)
-            # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
-            # peeling layer, approach equilibrium slowly.
+                    linear = position_response(solution.response())
+                    step = linear.slack_position_change(elongation, solution, last_slide)
+            # Without Newton's method, the iteration is accelerated, because parts much softer than the springs, such as
+            # a peeling layer, approach equilibrium slowly.
             anchor = mixing.mixed(anchor, anchor + elongation) if step is None else anchor + step[0]
-            last_stretch, relaxed = stretch, 0.0 if step is None else stretch
+            last_stretch, newton_stretch = stretch, 0.0 if step is None else stretch
             if step is not None and step[1] == np.inf:
                 last_stretch, slide_bound = np.inf, max(GROWTH * stretch, load_stretch)
-        state = dataclasses.replace(state, iterations=iterations)
-        return RigidPosition(state, anchor, self.stiffness * elongation, positions, slack)
+        solution = dataclasses.replace(solution, iterations=iterations)
+        return RigidPosition(solution, anchor, self.stiffness * elongation, positions, slack)

@@ -22,7 +22,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 class FrictionIncrements:
-    """Decision whether, and from which pairing on, friction of a load step is solved in increments; see `geometry_loop`.
+    """Decision whether friction of a load step is solved in increments, and when this begins; see `geometry_loop`.
 
     Parameters
     ----------
@@ -136,8 +136,8 @@ def _path(step: StepContext, constraints: StackedConstraints, nodes: SharedNodes
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
     """Return the tangential relative displacements (m, dim) that close the gaps (m,) if normals are inclined [length].
 
-    They are not slip, see `Path`. The constraints contain them as `slip0`, for the gaps that the displacements at the
-    beginning of the step have with the last pairing. Here they are scaled to `gap`.
+    They are not slip, see `Path`. The constraints contain them as `slip0`, for the gaps of the last pairing at the
+    displacements at the beginning of the step. Here they are scaled to `gap`.
     """
     closing = np.zeros_like(constraints.positions)
     for name, rows in constraints.rows.items():

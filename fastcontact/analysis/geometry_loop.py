@@ -22,7 +22,7 @@ from numpy.linalg import LinAlgError
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact.analysis.anderson import DEPTH, Anderson
-from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
+from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged, nearest_nodes
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.friction_increments import FrictionIncrements
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
@@ -36,8 +36,8 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
 # Smallest number of pairings after which edges of facets are rounded, because pairings are assumed to alternate.
-PATIENT_UPDATES = 25
-# Safety factor of the expected contraction by the next solution, relative to the contraction in the last Newton step.
+UPDATES_BEFORE_ROUNDING = 25
+# Safety factor for the contraction of changes by the next solution, which is estimated from the last Newton step.
 SAFETY = 3.0
 
 
@@ -52,13 +52,13 @@ class SettledContact:
     solution : Solution
     iterate : Iterate
     last_change : (int, float), optional
-        The number of updates, if it is fixed, and the relative change of the displacements in the last update.
+        If the number of updates is fixed, this number and the relative change of the displacements in the last update.
     scatter : dict, optional
         Scatter of the last iterates, see `ScatterWindow.add`, if round-off prevents convergence to `Criteria.geometry`.
     nodes : SharedNodes, optional
         Nodes of several pairs, or at both ends of a period, whose constraints are merged.
     paired_at : ndarray (k,), optional
-        Displacements of the last pairing, the components `Problem.contact_dofs` [length].
+        Displacements at the last pairing, in the components `Problem.contact_dofs` [length].
     """
 
     constraints: StackedConstraints
@@ -154,15 +154,15 @@ def _settle(
             raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue
-        change, size = last_update.change, last_update.size
-        enough = tolerances.enough(size)
+        change, size = last_update.change, last_update.largest_displacement
+        tolerance = tolerances.geometry_tolerance(size)
         if not tolerances.inexact:
-            increments.check(constraints, solution, change - enough, size, iterate.u)
+            increments.check(constraints, solution, change - tolerance, size, iterate.u)
         paired_at = last_update.before[problem.dofs.compared]
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=paired_at)
         if not solution.settled or tolerances.inexact:
             window = ScatterWindow()
-        elif change <= enough and not (increments.due or increments.unfinished):
+        elif change <= tolerance and not (increments.due or increments.unfinished):
             return settled
         elif scatter := window.add(displacement, settled.force, change, size, mixing.contraction):
             log.info(
@@ -170,23 +170,23 @@ def _settle(
                 "contact forces by %.1e (Criteria.geometry = %g)", *scatter.values(), problem.criteria.geometry,
             )  # fmt: skip
             return replace(settled, scatter=scatter)
-        iterate.u[problem.dofs.active] = mixing.next(settled, last_update, displacement, enough, tolerances.inexact)
-        tolerances.tighten(last_update.relative, solution.residual)
-        late = update >= max(limit // 2, PATIENT_UPDATES) and not iterate.rounded
+        iterate.u[problem.dofs.active] = mixing.next(settled, last_update, displacement, tolerance, tolerances.inexact)
+        tolerances.tighten(last_update.relative_change, solution.residual)
+        late = update >= max(limit // 2, UPDATES_BEFORE_ROUNDING) and not iterate.rounded
         if late and any(pair.alternates(constraints.parts[name]) for name, pair in problem.pairs.items()):
-            log.info("pairings alternate: from now on edges of facets are rounded, and small overlaps have no gap")
+            log.info("pairings alternate: edges of facets are now rounded, and small overlaps carry no constraint")
             iterate.rounded = True
             mixing.accelerated, window = None, ScatterWindow()
     if problem.until_settled:
         changes = np.zeros_like(iterate.u)
         changes[problem.dofs.active] = displacement - last_update.before
-        raise ConvergenceError(geometry_moves(problem, iterate.history, changes, limit), iterate.history)
+        raise ConvergenceError(geometry_not_converged(problem, iterate.history, changes, limit), iterate.history)
     increments.check(constraints, solution, 0.0, 0.0, iterate.u)
     if increments.due or increments.unfinished:
         del iterate.history[-limit - 1 :]
         return _settle(step, iterate, increments)
-    fixed = limit and not criteria.keep_pairing
-    return SettledContact(constraints, solution, iterate, (limit, last_update.relative) if fixed else None, nodes=nodes)
+    last_change = (limit, last_update.relative_change) if limit and not criteria.keep_pairing else None
+    return SettledContact(constraints, solution, iterate, last_change, nodes=nodes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,22 +199,23 @@ class _Update:
         Displacements before the update [length].
     change : float
         Largest change of a component [length].
-    size : float
-        Largest displacement, to which the change is compared [length].
-    relative : float
-        Ratio of `change` to `size`; zero without displacements, and for changes that are round-off of gaps [-].
+    largest_displacement : float
+        Scale of the displacements, to which the change is compared [length].
+    relative_change : float
+        Ratio of `change` to `largest_displacement`; zero without displacements, and for changes that are round-off of
+        gaps [-].
     """
 
     before: Array
     change: float
-    size: float
-    relative: float
+    largest_displacement: float
+    relative_change: float
 
 
 def _store_solution(
     step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, displacement: Array
 ) -> _Update:
-    """Store a solution, and its displacements (k,) of the components of `Problem.dofs` [length], in the iterate."""
+    """Store a solution and its displacements (k,) of the components of `Problem.dofs` [length]; return the update."""
     active_dofs = step.problem.dofs.active
     before = iterate.u[active_dofs]
     iterate.u[active_dofs] = displacement
@@ -227,7 +228,7 @@ def _store_solution(
         iterate.active[name] = solution.wanted[rows]
         forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
         iterate.pressure[name] = constraints.parts[name].pressure(forces)  # without fluid pressure
-    entry = {"displacement_change": last_update.relative, "active": int(solution.active.sum())}
+    entry = {"displacement_change": last_update.relative_change, "active": int(solution.active.sum())}
     entry |= {"active_set_iterations": solution.iterations, "settled": solution.settled}
     iterate.history.append(entry | ({"rounded": True} if iterate.rounded else {}))
     return last_update
@@ -236,8 +237,8 @@ def _store_solution(
 class _Mixing:
     """Choice of the next iterate: by Newton's method while it converges, and by Anderson acceleration otherwise.
 
-    Anderson acceleration uses only iterates with the same active set, between which the geometry varies smoothly, unless an
-    active set recurs after a different one: each set then results from the geometry of the other.
+    Anderson acceleration uses only iterates with the same active set, between which the geometry varies smoothly, unless
+    active sets alternate, because each of them then results from the geometry of the other.
 
     Parameters
     ----------
@@ -259,19 +260,19 @@ class _Mixing:
     accelerated: Anderson | None
 
     def next(
-        self, settled: SettledContact, last_update: _Update, displacement: Array, enough: float, inexact: bool
+        self, settled: SettledContact, last_update: _Update, displacement: Array, tolerance: float, inexact: bool
     ) -> Array:
         """Return the displacements (k,) for the next pairing, of the components of `Problem.dofs` [length].
 
-        After an `inexact` solution, these are the displacements of the solution, `displacement` (k,). Changes below `enough`
-        [length] have converged. Newton's method is abandoned once changes increase, because it does not converge if nodes
-        alternate between facets. It is also omitted if the next solution alone is expected to converge, because a solution
-        without a Newton step is cheaper.
+        After an `inexact` solution, these are the displacements of the solution, `displacement` (k,). The geometry has
+        converged if changes are below `tolerance` [length]. Newton's method is abandoned once changes increase,
+        because it does not converge if nodes alternate between facets. It is also omitted if the next solution alone is
+        expected to converge, because a solution without a Newton step is cheaper.
         """
         solution, before, change = settled.solution, last_update.before, last_update.change
         self._newton, self._change = self._newton and change <= self._change, change
-        if self._newton and solution.settled and SAFETY * self.contraction * change > enough:
-            newton_result = newton_step(self._step, settled, before, displacement, enough / change)
+        if self._newton and solution.settled and SAFETY * self.contraction * change > tolerance:
+            newton_result = newton_step(self._step, settled, before, displacement, tolerance / change)
             if newton_result is not None:
                 next_pairing, self.contraction = newton_result
                 return next_pairing

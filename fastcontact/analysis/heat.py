@@ -31,7 +31,7 @@ class Temperatures:
     Attributes
     ----------
     rise : ndarray (n_points,)
-        Temperature rise over the reference [temperature].
+        Temperature rise above the reference temperature [temperature].
     reaction : ndarray (n_points,)
         Heat flow into the nodes with prescribed temperatures [power].
     balance : dict
@@ -45,7 +45,7 @@ class Temperatures:
 
 @dataclass(frozen=True, eq=False)
 class ThermalLoads:
-    """Heat exchange of loads and films with the surroundings of the bodies.
+    """Heat loads and films of a model.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class ThermalLoads:
 
 
 def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoads:
-    """Return the heat exchange of a model, with the areas and volumes at a displacement (n_points, dim) [length]."""
+    """Return the heat loads and films of a model, whose areas and volumes are deformed by a displacement (n_points, dim)."""
     mesh, films = model.mesh, csr_array((model.mesh.n_points,) * 2)
     deformed = mesh if displacement is None else mesh.replace(points=mesh.points + displacement)
     geometry = mesh, model.kinematics, deformed
@@ -79,7 +79,7 @@ def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoa
 
 @dataclass(frozen=True, eq=False)
 class Heat:
-    """Heat conduction of a model, prepared for analysis; temperatures are rises over the reference.
+    """Heat conduction of a model, prepared for analysis; temperatures are rises above the reference temperature.
 
     Attributes
     ----------
@@ -123,13 +123,13 @@ class Heat:
         return any({"conductance", "friction_heat"} & set(pair.options) for pair in self.model.contact)
 
     @property
-    def finite(self) -> bool:
+    def finite_strain(self) -> bool:
         """Whether heat is conducted in the deformed bodies."""
         return self.model.strain == "finite"
 
-    def conductors(self, displacement: Array) -> Conduction:
-        """Return the conduction of the cells at displacements (n_points, dim), deformed with finite strains [length]."""
-        return replace(self.conduction, displacement=displacement) if self.finite else self.conduction
+    def conduction_at(self, displacement: Array) -> Conduction:
+        """Return the conduction, with finite strains that in the configuration deformed by `displacement` (n_points, dim)."""
+        return replace(self.conduction, displacement=displacement) if self.finite_strain else self.conduction
 
     def temperatures(
         self, instant: float, displacement: Array | None = None, contact: csr_array | None = None,
@@ -157,8 +157,8 @@ class Heat:
         """
         n = (self.model.mesh.n_points,)
         conductivity, exchange = self.matrix, self.loads
-        if displacement is not None and self.finite:
-            conductivity, exchange = self.conductors(displacement).matrix(), thermal_loads(self.model, displacement)
+        if displacement is not None and self.finite_strain:
+            conductivity, exchange = self.conduction_at(displacement).matrix(), thermal_loads(self.model, displacement)
         histories = self.prescribed, exchange.powers, exchange.ambient
         rise, loads, ambient = (combined(by_ramp, self.ramp, instant, n) for by_ramp in histories)
         friction_power = np.zeros(n) if friction is None else friction
@@ -166,12 +166,12 @@ class Heat:
         films = exchange.films
         if obstacles is not None:
             films, ambient = csr_array(films + obstacles[0]), ambient + obstacles[1]
-        self._check_reached(contact, films)
+        self._check_determined(contact, films)
         P, power = self.merged, loads + ambient + friction_power
         A, f = csr_array(P.T @ (conductivity + films) @ P), P.T @ power
-        used = np.zeros(n, bool)
-        used[P.indices] = self.body >= 0
-        free = np.flatnonzero(used & ~self.fixed)
+        in_cells = np.zeros(n, bool)
+        in_cells[P.indices] = self.body >= 0
+        free = np.flatnonzero(in_cells & ~self.fixed)
         rise = np.where(self.fixed, rise, 0.0)
         if len(free):
             dim, free_A = self.model.mesh.dim, csr_array(A[free][:, free])
@@ -201,7 +201,7 @@ class Heat:
         sums = {"supports": reaction, "loads": loads, "films": film_power, "friction": friction_power}
         return Temperatures(rise, reaction, {**{k: float(v.sum()) for k, v in sums.items()}, "imbalance": residual})
 
-    def _check_reached(self, contact: csr_array | None, films: csr_array) -> None:
+    def _check_determined(self, contact: csr_array | None, films: csr_array) -> None:
         """Raise a ConvergenceError if the temperature of a body is undetermined."""
         determined = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)

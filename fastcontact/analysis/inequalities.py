@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis import active_set
-from fastcontact.analysis.convergence_messages import friction_exceeded, not_balanced
+from fastcontact.analysis.convergence_messages import friction_exceeded, not_restrained
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
@@ -291,11 +291,11 @@ def _with_floating_bodies(
     position_response = None if problem.solver.iterative else partial(bodies.position_response, constraints, dofs)
     springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
     rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, state.gap_round_off)
-    if rigid.state.settled and not rigid.slack:
+    if rigid.solution.settled and not rigid.slack:
         gaps = gap_changes(problem.model, bodies.motions)
-        raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
+        raise failure(not_restrained(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
-    solution, respond = rigid.state, rigid.state.response
+    solution, respond = rigid.solution, rigid.solution.response
     if position_response is not None and respond is not None:
         solution = replace(solution, response=lambda: position_response(respond()).respond)
     return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.anchor))

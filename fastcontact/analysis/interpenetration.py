@@ -55,7 +55,7 @@ def interpenetration(problem: Problem, last: StepResult, peaks: Sequence[Peak]) 
 
 
 def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
-    """Return the names of the contact pairs between each two bodies; empty for the two sides of a pretension section."""
+    """Return the names of the contact pairs between any two bodies; empty for the two sides of a pretension section."""
     body = bodies(problem.model.mesh)[1]
     groups: dict[frozenset[int], list[str]] = {}
     for name, pair in problem.pairs.items():
@@ -71,7 +71,7 @@ def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
 def _without_contact(
     problem: Problem, pairs_between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Overlap]
 ) -> list[str]:
-    """Return a warning for each two overlapping bodies without a contact pair between them, the deepest overlap first."""
+    """Return a warning for any two overlapping bodies without a contact pair between them, the deepest overlap first."""
     mesh, texts = problem.model.mesh, dict[frozenset[int], str]()
     _, body = bodies(mesh)
     for first, second, points, depth in sorted(overlaps, key=lambda entry: -float(entry[3].max())):

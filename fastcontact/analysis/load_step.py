@@ -68,17 +68,17 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ConvergenceError
         If the step does not converge.
     """
-    load = cold = problem.load_at(instant)
+    load = cold_load = problem.load_at(instant)
     if problem.heat is not None:
         rise = first_rise(problem, problem.heat, state, instant)
-        load = thermal_load(problem, cold, rise)
+        load = thermal_load(problem, cold_load, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     begin = prepare_start(problem, state, index, load)
     heat_solution, solution = None, newton(begin, load)
     if problem.heat is not None:
         heat_solution, solution = settle_heat(
-            problem, begin.state, cold, instant, rise, solution, partial(newton, begin)
+            problem, begin.state, cold_load, instant, rise, solution, partial(newton, begin)
         )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     return _end_of_step(problem, begin.state, load, solution, iterations, (index, instant), heat_solution)
@@ -211,7 +211,7 @@ def _contact_at_end(
     results = contact_results(problem, start, load, settled, replace(end, first_contact=first_contact))
     touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
     never_opening, worn, slipped = dict(start.never_opening), dict(start.worn), dict(start.slipped)
-    forces, elastic_slip, bonds, works = dict(start.forces), {}, {}, np.zeros(3)
+    forces, elastic_slip, bonds, work_increments = dict(start.forces), {}, {}, np.zeros(3)
     for name, configuration in configurations.items():
         pair, constraints, rows = problem.pairs[name], parts[name], rows_of_pairs[name]
         if pair.options.kind == "bilateral_once_closed":
@@ -242,7 +242,7 @@ def _contact_at_end(
                 closed = contact.active if before is None else contact.active | (before.pressing > 0.0)
                 load_of_pair = sliding_load(constraints, solution, rows, slip_integrals, closed, pair.secondary)
             contact = replace(contact, dissipation=work_of_pair[0], sliding_load=load_of_pair)
-            works += work_of_pair
+            work_increments += work_of_pair
         if pair.options.wear is not None:
             wear = start.worn.get(name, Worn.nothing(len(contact.points)))
             worn[name] = wear.after(pair, configuration, contact, pair.options.wear)
@@ -255,7 +255,7 @@ def _contact_at_end(
         last_change=settled.last_change, never_opening=never_opening, elastic_slip=elastic_slip, bonds=bonds, worn=worn,
         slipped=slipped, forces=forces, touched=touched,
         first_contact={name: positions for name, positions in first_contact.items() if name in touched},
-        work=None if start.work is None else start.work.after(energy, stored, works.tolist(), released),
+        work=None if start.work is None else start.work.after(energy, stored, work_increments.tolist(), released),
     )  # fmt: skip
     return end, results
 

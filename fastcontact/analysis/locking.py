@@ -62,7 +62,7 @@ def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Seq
     The first is the energy norm of the difference between recovered and computed stress, over that of the computed one. It is
     the largest of the ratios of all bodies together and of single bodies with a notable part of the energy. Where bodies
     yield, it is the ratio of all bodies, relative to the root of twice the elastic and plastic work: the residual stresses of
-    unloaded bodies scatter by 72 % about recovered ones also where eight cells across a beam bend right.
+    unloaded bodies scatter by 72 % about recovered ones even where eight cells across a beam represent bending well.
 
     The second is the same for the root mean square of the mean stress in nearly incompressible triangles and tetrahedra.
     """

@@ -112,14 +112,14 @@ def modes(
     if sectors is None or diameters is None:
         values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
         vibration.warn_of_sliding_modes(values, vectors)
-        found = _modes(vibration, values, vectors)
+        result = _modes(vibration, values, vectors)
     else:
         waves = [Wave(sectors, d) for d in diameters]
         pairs = [(wave, *vibration.wave_eigenpairs(wave, n, linear_solver)) for wave in waves]
-        found = _ring_modes(vibration, sectors, pairs)
-    if found.unstable.any():
-        warn(f"{found.remarks()[0]}: the loads exceed a buckling load, or nodes slide (hold_sliding=True)")
-    return found
+        result = _ring_modes(vibration, sectors, pairs)
+    if result.unstable.any():
+        warn(f"{result.remarks()[0]}: the loads exceed a buckling load, or nodes slide (hold_sliding=True)")
+    return result
 
 
 def _diameters(

@@ -50,7 +50,7 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
     Parameters
     ----------
     begin : StepContext
-        Data at the beginning of the step, with the linear solver at rest.
+        Data at the beginning of the step, with the linear solver prepared for zero displacements.
     load : StepLoad
         Load of `begin`, or the same with other temperatures.
     before : StepEquilibrium, optional
@@ -111,14 +111,14 @@ class Regularisation:
         Stiffness of springs along closed gaps, over the largest stiffness of the bodies [-].
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
-    replaces : bool
+    replaces_springs : bool
         Whether the springs along closed gaps replace those of floating bodies, provided that they resist all free motions.
     """
 
     geometric: int = COMPLETE
     gap_stiffness: float = 0.0
     stiff: bool = False
-    replaces: bool = False
+    replaces_springs: bool = False
 
     @property
     def linear(self) -> bool:
@@ -140,7 +140,7 @@ class _Newton:
         self._linear_tolerance: float | None = None  # of the last linear solution, if larger than that of the solver
         self._moved_fully = False  # whether displacements are those of the last contact solution
         self._regularisation = Regularisation()  # of the last tangent
-        self._replaces = bool(begin.problem.force_driven.pairs)  # see `Regularisation.replaces`
+        self._replaces_springs = bool(begin.problem.force_driven.pairs)  # see `Regularisation`
         self._mixing = Anderson(DEPTH, np.arange(len(begin.state.u)))
 
     def equilibrium_from(self, origin: Array) -> StepEquilibrium:
@@ -236,7 +236,7 @@ class _Newton:
         """Return whether a further iteration with the last tangent is expected to be the last iteration.
 
         The next change of Newton's method is C times the square of the last one. The error after a second iteration with
-        the same tangent is C^2 times the cube of the last change. Further ones reduce it by a constant rate.
+        the same tangent is C^2 times the cube of the last change. Further ones reduce it at a constant rate.
         """
         if self._reused:
             return self._rate(changes) ** 2 * changes[-1] <= self._tolerance
@@ -259,7 +259,7 @@ class _Newton:
         """
         # While a floating body moves along motions that springs along gaps do not resist, its forces are not in balance.
         if self._regularisation.gap_stiffness and changes[-1] > changes[-2] > min(changes):
-            self._replaces = True
+            self._replaces_springs = True
         failure: Exception | None = None
         for regularisation in self._regularisations():
             try:
@@ -284,8 +284,9 @@ class _Newton:
         closed = settled is not None and settled.solution.active.any()
         iterative = self._problem.solver.iterative
         unmodified = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and iterative)]]
-        replaces = self._replaces or (settled is not None and settled.constraints.tangents != ())
-        with_springs = [Regularisation(gap_stiffness=GAP_STIFFNESS, stiff=floats, replaces=replaces)] if closed else []
+        replaces = self._replaces_springs or (settled is not None and settled.constraints.tangents != ())
+        along_gaps = Regularisation(gap_stiffness=GAP_STIFFNESS, stiff=floats, replaces_springs=replaces)
+        with_springs = [along_gaps] if closed else []
         if self._regularisation in with_springs:
             unmodified = []  # the unmodified tangent failed before
         geometric = self._regularisation.geometric
@@ -308,7 +309,7 @@ class _Newton:
         else:
             K = terms.tangent(u, regularisation.geometric)
             contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == COMPLETE else None
-            problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces)
+            problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces_springs)
         unbalanced, floating = self._load.force - terms.residual(u)[0], problem.floating_bodies
         # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
         force = unbalanced + problem.system.K @ (u if floating is None else floating.strained(u))

@@ -50,7 +50,7 @@ from fastcontact.model.rigid_motions import FreeMotions, free_motions
 from fastcontact.round_off import SINGLE_PRECISION
 
 ByRamp = Mapping[PartHistory, Array]
-# Shear of nodes that close and slide which is neglected by default, relative to the frictional capacity.
+# Shear, relative to the frictional capacity, that is neglected by default at nodes that close and slide.
 NEGLIGIBLE = 1e-3
 
 
@@ -177,7 +177,7 @@ class Problem:
         """`Criteria.friction_while_touching` or its default; 1 means that friction is solved in whole steps.
 
         With nonlinear bodies it is 1, because their steps are halved instead. Between bodies the default is 1 unless each
-        node has one weighted gap: the other formulations reproduce code_aster, which counts slip from the beginning of the
+        node has one weighted gap: the other formulations reproduce code_aster, which measures slip from the beginning of the
         step.
         """
         criteria, floats = self.criteria, self.floating_bodies is not None

@@ -197,7 +197,7 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
 
     This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the largest energy.
     Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps,
-    and 1e-5 if slip counts from first contact.
+    and 1e-5 if slip is measured from first contact.
     """
     work = state.work
     if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
@@ -205,7 +205,7 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
         hint = "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
-            "close, or contact is lost, where the slip of the complete step counts, not that in contact: the work of "
+            "close, or contact is lost, where the slip is that of the complete step, not only that in contact: the work of "
             f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{hint}"
         )
 
@@ -252,7 +252,7 @@ def _loose_criteria(problem: Problem, last: StepResult) -> Iterator[str]:
         yield (
             "nodes alternated between two facets of the primary side, or between open and closed gaps, which changed the "
             f"displacement by {last_alternation['displacement_change']:.1e} of its largest component. To converge, normals "
-            "were interpolated between facets over a tenth of each facet, and nodes with a small overlap had no gap; "
+            "were interpolated between facets over a tenth of each facet, and nodes with a small overlap had no constraint; "
             'normals="averaged" makes this unnecessary'
         )
     if scatter is not None and scatter["force"] > criteria.relative:
@@ -468,17 +468,17 @@ def facets_across_radius(side: Surface, closed: Mask, excluded: Mask) -> int | N
 def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model) -> Iterator[str]:
     """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by a large fraction of their mean.
 
-    Open nodes between closed ones count as closed with zero pressure: with wear, every second node may be open.
-    The measure is the median of the differences from the mean of the neighbours, each over the local mean, half the sum of
-    the two, which is not zero where only the neighbours are open. On rings of tri3 cells 4.6 times as deep as wide it is
+    Open nodes between closed ones count as closed with zero pressure: with wear, every second node may be open. The measure
+    is the median of the differences from the mean of the neighbours, each divided by half the sum of the pressure and this
+    mean, which is not zero where only the neighbours are open. On rings of tri3 cells 4.6 times as deep as wide, it is
     0.30, with pressure errors of 0.16 to 0.27; on wider ones 0.16 (0.09 to 0.13), on quadrangles 0.002; under punches of
     hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12, and under a wearing hex8 sole 0.22. On quadratic
     facets, the neighbours of corners are the other nodes and vice versa, see `_alternation_matrix`. On rings of quad8 and
     tri6 cells it is 0.15 or more with pressure errors of 0.14 to 1, and less with errors of up to 0.2, or 0.4 where meshes
     nearly match: errors then vary along the side, which the median does not show. On a stiff quad8 strip that bends on a
     soft base with larger facets it is 0.13 with errors of 0.3, or 0.1 without a warning if the strip does not bend. Under
-    elastic punches of quad8 and tri6 cells whose facets are as large as the opposite ones it is 0.07 or less. On coarse faces
-    of hex20 under an elastic punch it is up to 0.18.
+    elastic punches of quad8 and tri6 cells whose facets are as large as the opposite ones it is 0.07 or less. On coarse
+    faces of hex20 under an elastic punch it is up to 0.18.
 
     Sides that never separate or that adhere carry tension as well. Their mean may be zero or round-off and is not used.
     """
@@ -505,7 +505,7 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
 
 
 def _oscillation_remedy(pair: Formulation, model: Model) -> str:
-    """Return what reduces the oscillation of the pressures of a pair."""
+    """Return the remedy for oscillating pressures of a pair."""
     side, primary = pair.secondary, pair.primary
     if isinstance(primary, Surface):
         modulus, other = (_modulus(model, surface.points) for surface in (side, primary))
@@ -570,9 +570,9 @@ def _alternation_matrix(side: Surface) -> csr_array:
 def _neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iterator[str]:
     """Yield a warning for the body in which linear kinematics neglect most; `angle` is the largest rotation [radian]."""
     mesh = problem.model.mesh
-    neglected, strain_works = _works_on_strains(problem, last)
+    neglected, work_by_body = _work_on_strains(problem, last)
     # Bodies whose work on strains is round-off of that of other bodies are free of stress.
-    ratio = np.abs(neglected) / np.maximum(strain_works, max(SINGLE_PRECISION * strain_works.max(initial=0.0), TINY))
+    ratio = np.abs(neglected) / np.maximum(work_by_body, max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY))
     worst = int(np.argmax(ratio))
     if ratio[worst] > NEGLECTED:
         name = body_name(mesh, bodies(mesh)[1], worst)
@@ -621,11 +621,11 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
     return capacity
 
 
-def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
+def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
     """Return the work of the stresses on neglected strains, and its absolute value on strains, both (n_bodies,) [energy]."""
     mesh, axisymmetric = problem.model.mesh, problem.model.kinematics == "axisymmetric"
     count, body = bodies(mesh)
-    neglected, strain_works = np.zeros((2, count))
+    neglected, work_by_body = np.zeros((2, count))
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, weights = element.quadrature
@@ -642,5 +642,5 @@ def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]
             # The neglected strain is half the product of the transposed rotation, which is antisymmetric, with the rotation.
             neglected_work = -0.5 * np.einsum("cqij,cqij->cq", tensor, rotation @ rotation)
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
-            np.add.at(strain_works, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
-    return neglected, strain_works
+            np.add.at(work_by_body, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
+    return neglected, work_by_body

@@ -180,7 +180,7 @@ def _solved_steps(
     model: Model, ramp: Ramp, prepare_model: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
     last: StepResult | None, peaks: dict[str, Peak],
 ) -> Iterator[StepResult]:  # fmt: skip
-    """Yield the steps at `instants`, after the step `last`; `peaks` are the `_peaks` until then."""
+    """Yield the steps at `instants`, after the step `last`; `peaks` is the result of `_peaks` up to then."""
     model_texts = model_warnings(model, ramp)
     for text in model_texts if last is None else ():
         warn(text)

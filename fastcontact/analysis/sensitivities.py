@@ -1,9 +1,10 @@
 """Sensitivities: derivatives of one quantity with respect to many parameters from one adjoint solution.
 
-At the end of a load step, ``K u = f + B.T multiplier`` and ``gap0 + B u + C multiplier = 0`` of the active constraints are
-smooth equations as long as the active set does not change. The adjoint solution for a quantity, with the transposed matrix of
-these equations, gives its derivative with respect to every parameter as a scalar product with the derivative of the residual
-(Haftka and Gürdal, Elements of Structural Optimization, 1992, chapter 7).
+At the end of a load step, equilibrium ``K u = f + B.T multiplier`` and the active constraints
+``gap0 + B u + C multiplier = 0``, with the compliance C of the contact, are smooth equations as long as the active set does
+not change. The adjoint solution for a quantity, with the transposed matrix of these equations, gives its derivative with
+respect to every parameter as a scalar product with the derivative of the residual (Haftka and Gürdal, Elements of Structural
+Optimization, 1992, chapter 7).
 """
 
 from __future__ import annotations
@@ -189,7 +190,7 @@ def _kink_message(contact: MovingContact, kinks: csr_array, jump: float) -> str:
     remainder = f" and {len(points) - 3} more" if len(points) > 3 else ""
     return (
         f"points {first_points}{remainder} lie opposite nodes of the other side, between two of its facets: the one-sided "
-        f"derivatives differ by a fraction of {jump:.1e}. {OPPOSITE_NODES}"
+        f"derivatives differ by a relative amount of {jump:.1e}. {OPPOSITE_NODES}"
     )
 
 
@@ -238,7 +239,7 @@ def _check_independent_of_path(model: Model, step: StepResult, criteria: Criteri
     if any(isinstance(relation, TemporaryConstraint) and relation.acts_from(begin) for relation in model.relations):
         raise ModelError(
             "pretension sections or temporary supports hold positions from earlier load steps, and sensitivities consider a "
-            "single step. Request them in the last step before the lock, or use finite differences of two solutions"
+            "single step. Request sensitivities before the positions are held, or use finite differences of two solutions"
         )
     if criteria.geometry_updates is not None and not criteria.keep_pairing:
         raise ModelError(

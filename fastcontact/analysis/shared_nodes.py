@@ -1,10 +1,11 @@
 """Merging of the constraints at nodes of several contact pairs, or at both ends of a periodic part or sector.
 
-A node of several pairs behaves like a node of one pair over all their facets. Its constraints are linearly dependent. They
-determine only the sum of their forces and cannot all be eliminated. They are therefore replaced by their mean, which has the
-sum of their areas, so that penalties add up, and their mean coefficient of friction. Each pair carries a fraction of the
-force that is proportional to its area, so that the pressures are equal. Of several clearances at one node, only the smallest
-can close. Constraints with a coupled normal compliance or with different clearances are not merged.
+A node that belongs to several pairs behaves like a node of one pair that contains all their facets. Its constraints are
+linearly dependent: they determine only the sum of their forces, and they cannot all be eliminated. They are therefore
+replaced by their mean. Its area is the sum of their areas, so that penalties add up, and its coefficient of friction is the
+mean. Each pair carries a fraction of the force that is proportional to its area, so that the pressures are equal. If the
+clearances at one node differ, only the constraint with the smallest one can close. Constraints with a coupled normal
+compliance or with different clearances are not merged.
 
 Two nodes at the ends of a periodic part are also regarded as one node, whose gap is the area-weighted mean of both gaps.
 Tangents at the second end are rotated to the first one before they are compared.
@@ -78,7 +79,7 @@ class SharedNodes:
         return np.asarray(self._sums @ values)
 
     def merged_constraints(self, constraints: StackedConstraints) -> Constraints:
-        """Return the constraints of the representatives alone, each with the area of all constraints it represents."""
+        """Return constraints of which only the representatives, with the areas of all they represent, can close."""
         merged = {
             "B": csr_array(self._sums @ scaled(constraints.B, self.normal_fraction)),
             "gap0": self.summed(self.normal_fraction * constraints.gap0),
@@ -180,8 +181,8 @@ def _at_periodic_interfaces(
     pairs = [np.empty((2, 0), np.intp)]
     for rows in constraints.rows.values() if interfaces else ():
         usable_rows = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
-        last = max(int(end.max()) for interface in interfaces for end in interface[:2])
-        row = np.full(max(last, int(nodes.max())) + 1, -1)
+        largest_node = max(int(end.max()) for interface in interfaces for end in interface[:2])
+        row = np.full(max(largest_node, int(nodes.max())) + 1, -1)
         row[nodes[usable_rows]] = usable_rows
         for interface in interfaces:
             rows_of_ends = row[np.stack([interface.first, interface.second])]
@@ -193,7 +194,7 @@ def _at_periodic_interfaces(
 def _representatives(constraints: Constraints, pairs: Indices) -> Indices:
     """Return the representative (m,) of each constraint, given linearly dependent `pairs` (2, k).
 
-    It is the first of them with friction, or the first of all if none has friction.
+    The representative of dependent constraints is the first one with friction, or the first one if none has friction.
     """
     m = len(constraints)
     label = connected_components(csr_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(m, m)), directed=False)[1]

@@ -1,6 +1,6 @@
 """Solutions of the contact problem, without and with friction, their accuracy, and the load path within a step.
 
-If a load step with friction is solved at once, the slip of a constraint is counted from the beginning of the step, although
+If a load step with friction is solved at once, the slip of a constraint is measured from the beginning of the step, although
 a constraint that closes within the step slides only after it has closed. In `in_increments` the load increment is therefore
 divided at the instants at which constraints close, and constraints carry no forces before they close. Several constraints
 may close in one increment; each slides from its own instant. These instants are found by linear interpolation of gaps. With
@@ -8,12 +8,12 @@ the geometry and the Delassus operator F at the end of the step, gaps vary linea
 or opens, and none changes between stick and slip. The result hardly depends on whether a force or a motion grows linearly in
 the step, because the constraints close in the same order.
 
-Let ``(g, s) = free + F y`` be the gaps and slips at the end of the step for forces y. At its beginning there are gaps g0,
-forces y0 and no slips. At a fraction p of the step, gaps and slips for forces y are
+Let ``(g, s) = free + F y`` be the gaps and slips at the end of the step for forces y. At the beginning of the
+step, the gaps are g0, the forces y0, and the slips zero. At a fraction p of the step, gaps and slips for forces y are
 ``free + (1 - p) * ((g0, 0) - free - F y0) + F y``.
 
 If normals are inclined, a constraint that closes has a tangential relative displacement that is not slip. The correction for
-closing the whole gap g0 is part of `free`. An increment that closes a fraction of g0 counts the same fraction of the
+closing the whole gap g0 is part of `free`. An increment that closes a fraction of g0 includes the same fraction of the
 correction.
 
 The last increment depends on the earlier ones only through their slips, which stay fixed while the geometry converges.
@@ -48,7 +48,8 @@ class Accuracy:
     max_iterations : int
         Largest number of linear solutions without friction. The iteration stops at this number even if it has not converged.
     inexact : bool
-        Whether linear solutions are inexact. Friction then takes a single Newton step, because errors may reverse slips.
+        Whether linear solutions are inexact. With friction, a single Newton step is then made, because errors may reverse
+        slips.
     """
 
     gap: float
@@ -58,8 +59,8 @@ class Accuracy:
     inexact: bool = False
 
 
-# Linear map to the change of the unknowns (n,) [length] from additional forces (n,) [force] on them, and from additional
-# gaps and slips (1 + k, m) of all constraints [length].
+# Linear map from additional forces (n,) [force] on the unknowns, and additional gaps and slips (1 + k, m) [length] of all
+# constraints, to the change of the unknowns (n,) [length].
 Response = Callable[[Array, Array], Array]
 
 
@@ -78,11 +79,11 @@ def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[A
         Function that returns the change ((1 + k) q,) of their normal and tangential forces [force], given a change
         ((1 + k) q,) of their gaps and slips [length].
     """
-    at_rest, transpose = loaded.full_solution(np.zeros(R.shape[1])), csr_array(R.T)
+    without_force, transpose = loaded.full_solution(np.zeros(R.shape[1])), csr_array(R.T)
 
     def respond(force: Array, gaps: Array) -> Array:
-        u = loaded.full_solution(force) - at_rest
-        return u + loaded.full_solution(transpose @ forces_of(R @ u + gaps[:, rows].ravel())) - at_rest
+        u = loaded.full_solution(force) - without_force
+        return u + loaded.full_solution(transpose @ forces_of(R @ u + gaps[:, rows].ravel())) - without_force
 
     return respond
 
@@ -155,7 +156,7 @@ class Path:
         -------
         forces : ndarray (1 + k, q)
             Normal forces, then tangential forces [force].
-        closed : ndarray (1 + k, q)
+        closing : ndarray (1 + k, q)
             Gaps, then the components of `closing` [length].
         """
         tangents, (traction, closing) = np.stack(directions)[:, rows], (self.traction[rows], self.closing[rows])
@@ -211,7 +212,7 @@ class Solution:
     settled : bool
         Whether all inequalities hold.
     iterations : int
-        Number of linear solutions, with friction of Newton iterations.
+        Number of linear solutions or, with friction, of Newton iterations.
     tangential : ndarray (m, k)
         Tangential forces on the secondary side, along each of k tangents; k is zero without friction [force].
     slip : ndarray (m, k)
@@ -276,7 +277,7 @@ def in_increments(
     Parameters
     ----------
     lag : ndarray (1 + k, m)
-        Gaps and slips at the beginning of the step, minus those at its end under the forces of its beginning [length].
+        Gaps and slips at the beginning of the step, minus those at its end if contact forces did not change [length].
     closing : ndarray (1 + k, m)
         Gaps at the beginning of the step, and the slips that closing them would add, see `Path.along` [length].
     y : ndarray (1 + k, m)
@@ -292,7 +293,7 @@ def in_increments(
     gaps : ndarray (1 + k, m)
         Gaps at the end of the step, and the slips of the whole step [length].
     before : tuple
-        `SlipSoFar`, with vectors by their components (k, m) along the tangents.
+        Attributes of `SlipSoFar`, where components (k, m) along the tangents replace the vectors.
     """
     closed, slip, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), 0, True
     integrals = np.zeros((2, lag.shape[1]))
@@ -307,7 +308,7 @@ def in_increments(
         return solve(remaining, ~waiting, closed, y if y.any() else None)
 
     def slip_after(increase: Array, gaps: Array) -> Array:
-        """Return the slips (k, m) after an `increase` (k, m), less the closing motion left for the `gaps` (m,)."""
+        """Return the slips (k, m) after an `increase` (k, m), less the closing motion that the remaining `gaps` (m,) add."""
         open_fraction = np.divide(np.maximum(gaps, 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
         return np.asarray(slip + increase - open_fraction * added)
 
@@ -316,13 +317,13 @@ def in_increments(
         end, forces = 1.0, increment(1.0)
         iterations += forces.iterations
         if (waiting & (forces.gaps[0] < 0.0)).any():
-            # In 3D about as many constraints close together as lie along the edge of the closed region.
+            # In 3D, about as many constraints close together as lie along the edge of the closed region.
             group_size = max(int(closed.sum() ** (1.0 - 1.0 / len(slip))), int(GROWTH * closed.sum()), 1)
             instants, touching = _next_to_close(last_gap, forces.gaps[0], waiting, group_size)
             fraction = min(float(instants[touching].max()), 1.0)
             end = begin + fraction * (1.0 - begin)
-            since = np.where(touching, instants, 0.0) * forces.gaps[1:]
-            slip = np.where(touching, slip_after(since, np.zeros_like(gap)), slip)
+            slip_since = np.where(touching, instants, 0.0) * forces.gaps[1:]
+            slip = np.where(touching, slip_after(slip_since, np.zeros_like(gap)), slip)
             slip_before_closing = np.where(touching, slip, slip_before_closing)
             waiting = waiting & ~touching
             forces = increment(end)

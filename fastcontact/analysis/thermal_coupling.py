@@ -48,7 +48,7 @@ class HeatSolution(Temperatures):
     def with_heat_results(self, problem: Problem, step: StepResult) -> StepResult:
         """Return the result of a load step with heat fluxes and heat reactions added."""
         assert problem.heat is not None
-        flux = problem.heat.conductors(step.displacement).flux(self.rise)
+        flux = problem.heat.conduction_at(step.displacement).flux(self.rise)
         with_flux = {name: replace(step.contact[name], heat_flux=power) for name, power in self.fluxes.items()}
         return replace(
             step, contact=step.contact | with_flux, heat_reaction=self.reaction,
@@ -59,7 +59,7 @@ class HeatSolution(Temperatures):
 
 def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Array:
     """Return the initial temperature rise (n_points,) of a load step [temperature]."""
-    if not (heat.depends_on_contact or heat.finite):
+    if not (heat.depends_on_contact or heat.finite_strain):
         return heat.temperatures(instant).rise
     return np.zeros(problem.model.mesh.n_points) if state.rise is None else state.rise
 
@@ -108,7 +108,7 @@ def settle_heat(
         rise = mixing.mixed(rise, heat_solution.rise)
         equilibrium = solve(thermal_load(problem, load, rise), equilibrium)
     raise ConvergenceError(
-        f"heat and contact do not converge: after {limit} times temperatures still change by {change:.3g}, for "
+        f"heat and contact do not converge: after {limit} exchanges, temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
         "conductance fall gradually with the gap, or grow from zero with the pressure",
         [] if equilibrium.settled is None else equilibrium.settled.iterate.history,
@@ -140,7 +140,7 @@ def _steady_temperatures(
     settled, u = equilibrium.settled, equilibrium.u
     heat, displacement = problem.heat, problem.displacement(u)
     assert heat is not None
-    n, laws, crossings = problem.model.mesh.n_points, problem.model.conductances(), {}
+    n, laws, conducting = problem.model.mesh.n_points, problem.model.conductances(), {}
     matrix, obstacles = csr_array((n, n)), csr_array((n, n))
     friction_power, obstacle_power = np.zeros((2, n))
     for name, pair in problem.pairs.items():
@@ -153,7 +153,7 @@ def _steady_temperatures(
         assert constraints.nodal is not None
         link = heat_transfer(constraints, pair.secondary, pair.primary, pair.points.shape)
         area_ratio = np.ones(n)  # ratio of deformed to undeformed area at each node
-        if heat.finite:
+        if heat.finite_strain:
             before, after = areas(pair, displacement)
             area_ratio[pair.secondary.points] = after / before
             link = replace(link, area=link.area * (link.secondary @ area_ratio))
@@ -167,13 +167,13 @@ def _steady_temperatures(
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
                 obstacles = csr_array(obstacles + link.matrix(h))
                 obstacle_power = obstacle_power + link.secondary.T @ (h * link.area * obstacle_rise)
-            crossings[name] = link, constraints.nodal, h, obstacle_rise, area_ratio[pair.secondary.points]
+            conducting[name] = link, constraints.nodal, h, obstacle_rise, area_ratio[pair.secondary.points]
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
-    powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in crossings.items()}
-    fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}
+    powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in conducting.items()}
+    fluxes = {name: conducting[name][1].over_whole_side(power) / conducting[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return HeatSolution(steady.rise, steady.reaction, balance, fluxes)
 

@@ -28,8 +28,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 RESIDUAL = 0.03
 # If the residual of the friction law determines the tolerance, the tolerance decreases at least by this factor, because
 # the residual of the law may not decrease if linear solutions are inaccurate.
-LEAST_FALL = 0.2
-# Number of geometry updates, or of Newton iterations, within which changes must decline.
+LEAST_REDUCTION = 0.2
+# Number of geometry updates, or of Newton iterations, within which changes must decrease.
 WINDOW = 8
 # Changes or distances below this fraction of earlier ones are regarded as decreasing. An iteration is regarded as converging
 # if the changes in the second half of the window are below this fraction of those in the first half.
@@ -70,7 +70,7 @@ class Tolerances:
         """
         residual = RESIDUAL * min(self._residual, relative_change)
         if RESIDUAL * law_residual > residual:
-            residual = min(RESIDUAL * law_residual, LEAST_FALL * self._residual)
+            residual = min(RESIDUAL * law_residual, LEAST_REDUCTION * self._residual)
         self._residual = max(self._solver.tolerance, residual)
 
     def accuracy(self, scale: float) -> Accuracy:
@@ -88,7 +88,7 @@ class Tolerances:
             inexact=self.inexact,
         )
 
-    def enough(self, size: float) -> float:
+    def geometry_tolerance(self, size: float) -> float:
         """Return the change of the displacements below which the geometry has converged [length].
 
         `size` is the largest displacement [length].
@@ -140,9 +140,9 @@ class ScatterWindow:
             return None
         (displacements, forces, changes), half = zip(*list(self._window)[-window:], strict=True), window // 2
         scatter = {"displacement": _spread(displacements) / size, "force": _spread(forces) / (largest(force) or 1.0)}
-        declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
+        decreasing = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
         # Displacements that move in one direction are about `window` changes apart, those that oscillate about one change.
-        if declining or scatter["displacement"] * size > half * float(np.median(changes)):
+        if decreasing or scatter["displacement"] * size > half * float(np.median(changes)):
             return None
         acceptable = scatter["displacement"] <= SINGLE_PRECISION and scatter["force"] <= 100 * SINGLE_PRECISION
         return scatter if acceptable else None

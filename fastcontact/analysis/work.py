@@ -86,7 +86,7 @@ class ContactForces:
 
 @dataclass(frozen=True)
 class Work:
-    """Energies at the end of a load step, and works of all steps so far [energy].
+    """Energies at the end of a load step, and the work of all steps so far [energy].
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Work:
     released : float
         Energy dissipated by the damage of cohesive layers.
     largest : float
-        The largest of these energies and works in all steps so far.
+        The largest of these values in all steps so far.
     plastic : float
         Plastic work.
     """
@@ -122,7 +122,7 @@ class Work:
         """External work, done by loads, supports and obstacles [energy]."""
         return self.strain_energy + self.plastic + self.friction + self.imbalance + self.stored + self.released
 
-    def after(self, energy: tuple[float, float], stored: float, works: Sequence[float], released: float = 0.0) -> Work:
+    def after(self, energy: tuple[float, float], stored: float, added: Sequence[float], released: float = 0.0) -> Work:
         """Return the work after another load step.
 
         Parameters
@@ -131,19 +131,19 @@ class Work:
             Strain energy and plastic work at the end of the step [energy].
         stored : float
             Energy of penalties, cohesive layers and adhesion at the end of the step [energy].
-        works : sequence of three float
-            Sums of the works of `contact_work` over all pairs [energy].
+        added : sequence of three float
+            Increments of `friction`, `touching` and `imbalance`, see `contact_work`, summed over all pairs [energy].
         released : float
             Energy dissipated by cohesive layers so far [energy].
         """
-        friction, touching, imbalance = works
+        friction, touching, imbalance = added
         sums = self.friction + friction, self.touching + touching, self.imbalance + imbalance
         work = Work(energy[0], *sums, stored, plastic=energy[1], released=released)
         terms = (self.largest, *energy, work.friction, abs(work.external))
         return replace(work, largest=max(terms))
 
     def as_dict(self) -> dict[str, float]:
-        """Return the energies and works under the names of `StepResult.work` [energy]."""
+        """Return these values under the names of `StepResult.work` [energy]."""
         return {
             "strain_energy": self.strain_energy, "plastic_work": self.plastic,
             "external_work": self.external, "friction_work": self.friction,
@@ -156,7 +156,7 @@ def contact_work(
     pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
     contact: ContactResult, before: ContactForces | None,
 ) -> tuple[ContactForces, tuple[float, float, float], Array]:  # fmt: skip
-    """Return the contact forces of a pair at the end of a load step, and the works of contact in this step.
+    """Return the contact forces of a pair at the end of a load step, and its work in this step.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def contact_work(
     Returns
     -------
     forces : ContactForces
-    works : (float, float, float)
+    increments : (float, float, float)
         Increments of `Work.friction`, `Work.touching` and `Work.imbalance` [energy].
     slip_integrals : ndarray (m,)
         Integrals of the normal forces over the slips in the step [energy].
@@ -247,7 +247,7 @@ def _frictional_work(
     work_at_begin, work_at_end = (-0.5 * np.einsum("md,md->m", forces, slips) for forces in tangential)
     ratio = np.divide(normal_before, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
     # A contact that moves over a surface leaves as much force behind as it gains ahead. Such a force acts during the complete
-    # step. These are the parts of the increase and of the decrease that compensate each other.
+    # step. `moved` and `moved_away` are the parts of the increase and of the decrease that compensate each other.
     changes = normal - normal_before, normal_before - normal
     increase, decrease = (float(np.maximum(change, 0.0).sum()) for change in changes)
     moved, moved_away = (change / max(increase, decrease, TINY) for change in (decrease, increase))

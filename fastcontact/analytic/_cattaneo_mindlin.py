@@ -22,9 +22,9 @@ class _PartialSlip:
     """Base class of line and point contact under a tangential load up to a peak, possibly followed by unloading.
 
     The theory is that of Mindlin and Deresiewicz (1953). Let F be the normal force, f the coefficient of friction and a the
-    contact radius. Under a first tangential load T the shear traction is f times the difference between the contact
+    contact radius. Under an initial tangential load T, the shear traction is f times the difference between the contact
     pressure and the pressure of a smaller contact, the stick zone, whose radius is a (1 - T/(f F))^p with p = `_POWER`.
-    Unloading from a peak T* to T subtracts twice the traction of a first load (T* - T)/2.
+    Unloading from a peak T* to T subtracts twice the traction of an initial load (T* - T)/2.
     """
 
     friction: float
@@ -36,8 +36,8 @@ class _PartialSlip:
 
     @property
     def stick_radius(self) -> float:
-        """Radius [length], in line contact half-width, of the stick zone (Cattaneo 1938; Mindlin 1949)."""
-        return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
+        """Radius of the stick zone, or its half-width in line contact [length] (Cattaneo 1938; Mindlin 1949)."""
+        return self._stick_radius(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     def unloaded_to(self, tangential_force: float) -> Self:
         """Return the contact after the tangential force has been reduced from its peak to `tangential_force`.
@@ -54,7 +54,7 @@ class _PartialSlip:
 
     @property
     def _reversal(self) -> float:
-        """First load (T* - T)/2 whose traction is subtracted twice on unloading from the peak T* to the current force T."""
+        """Initial load (T* - T)/2 whose traction is subtracted twice on unloading from the peak T* to the current force T."""
         return 0.5 * (self.tangential_force_peak - self.tangential_force)
 
     @property
@@ -62,27 +62,27 @@ class _PartialSlip:
         """Tangential force f F at which the bodies slide."""
         return self.friction * self.normal.force
 
-    def _zone(self, load: float) -> float:
-        """Return the radius or half-width [length] of the stick zone under a first load."""
+    def _stick_radius(self, load: float) -> float:
+        """Return the radius or half-width [length] of the stick zone under an initial load."""
         return self.normal.radius * max(1.0 - load / self._limit, 0.0) ** self._POWER
 
-    def _current(self, of_first_load: Callable[[float], Any]) -> Any:
-        """Return a quantity at the current force, given as a function of a first load."""
-        return of_first_load(self.tangential_force_peak) - 2.0 * of_first_load(self._reversal)
+    def _at_current_force(self, of_initial_load: Callable[[float], Any]) -> Any:
+        """Return a quantity at the current force, given as a function of an initial load."""
+        return of_initial_load(self.tangential_force_peak) - 2.0 * of_initial_load(self._reversal)
 
     def _traction(self, name: str, position: ArrayLike) -> Array:
         """Return the shear traction [pressure] at the current force; error messages call the position `name`.
 
-        Under a first load it is f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] with the stick radius c, where the root of
-        a negative number is replaced by zero.
+        Under an initial load, it is f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] with the stick radius c, where the
+        root of a negative number is replaced by zero.
         """
         x2, a = array(name, position) ** 2, self.normal.radius
 
-        def of_first_load(load: float) -> Array:
-            roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(self._zone(load) ** 2 - x2, 0.0))
+        def of_initial_load(load: float) -> Array:
+            roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(self._stick_radius(load) ** 2 - x2, 0.0))
             return self.friction * self.normal.pressure_max / a * roots
 
-        return np.asarray(self._current(of_first_load))
+        return np.asarray(self._at_current_force(of_initial_load))
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class CattaneoMindlinLine(_PartialSlip):
         For ``c <= |x| <= a`` it is the integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone to
         ``|x|``; it is zero in the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section 7.2(a)).
         """
-        return np.asarray(self._current(lambda load: self._slip(self._zone(load), x)))
+        return np.asarray(self._at_current_force(lambda load: self._slip(self._stick_radius(load), x)))
 
     @property
     def slip_displacement(self) -> float:
@@ -120,12 +120,12 @@ class CattaneoMindlinLine(_PartialSlip):
         on the distant supports of the bodies; it is not included.
         """
 
-        def of_first_load(load: float) -> float:
+        def of_initial_load(load: float) -> float:
             remainder = max(1.0 - load / self._limit, 0.0)
             logarithm = remainder * math.log(remainder) if remainder > 0.0 else 0.0
             return self._limit / (math.pi * self.normal.E_star) * (logarithm + 1.0 - remainder)
 
-        return float(self._current(of_first_load))
+        return float(self._at_current_force(of_initial_load))
 
     def _slip(self, c: float, x: ArrayLike) -> Array:
         """Return the slip (...) [length] at `x` (...) [length] for a stick zone of half-width c."""
@@ -164,7 +164,7 @@ class CattaneoMindlinSphere(_PartialSlip):
         During loading it is 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
         """
         factor, a = 3.0 * self._limit / (16.0 * self.normal.radius * self.G_star), self.normal.radius
-        return float(self._current(lambda load: factor * (1.0 - (self._zone(load) / a) ** 2)))
+        return float(self._at_current_force(lambda load: factor * (1.0 - (self._stick_radius(load) / a) ** 2)))
 
     @property
     def dissipation_per_cycle(self) -> float:
@@ -242,14 +242,14 @@ def cattaneo_mindlin_line(
     >>> contact = analytic.cattaneo_mindlin_line(
     ...     E1=1000.0, nu1=0.3, R1=10.0, friction=0.5, force=8.0, tangential_force=2.0, E2=1000.0, nu2=0.3
     ... )
-    >>> round(contact.stick_radius / contact.normal.radius, 6)  # (1 - Q / (mu F))^(1/2)
+    >>> round(contact.stick_radius / contact.normal.radius, 6)  # (1 - T / (f F))^(1/2)
     0.707107
     """
     normal = hertz_line(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2, force=force, radius=radius, pressure_max=pressure_max
     )
-    f, Q = _checked(normal, friction, tangential_force)
-    return CattaneoMindlinLine(f, Q, Q, normal)
+    f, T = _checked(normal, friction, tangential_force)
+    return CattaneoMindlinLine(f, T, T, normal)
 
 
 def cattaneo_mindlin_sphere(
@@ -300,7 +300,7 @@ def cattaneo_mindlin_sphere(
     >>> contact = analytic.cattaneo_mindlin_sphere(
     ...     E1=1000.0, nu1=0.3, R1=10.0, friction=0.5, force=8.0, tangential_force=2.0, E2=1000.0, nu2=0.3
     ... )
-    >>> round(contact.stick_radius / contact.normal.radius, 6)  # (1 - Q / (mu F))^(1/3)
+    >>> round(contact.stick_radius / contact.normal.radius, 6)  # (1 - T / (f F))^(1/3)
     0.793701
     """
     normal = hertz_point(
@@ -313,7 +313,7 @@ def cattaneo_mindlin_sphere(
 
 @dataclass(frozen=True)
 class BlockSliding:
-    """A block that a uniform pressure presses on a plane, and whose top is displaced tangentially.
+    """A block that is pressed onto a plane by a uniform pressure and whose top is displaced tangentially.
 
     The shear strain gamma is uniform. The shear traction is the smaller of G gamma, with the shear modulus G, and f p, with
     the coefficient of friction f and the pressure p.

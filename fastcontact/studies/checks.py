@@ -30,20 +30,20 @@ def check_runs(count: int) -> None:
     log.info("%d runs", count)
 
 
-def check_levels(case: Case, setup: Settings, members: Sequence[Combination], levels: int) -> None:
+def check_levels(case: Case, setup: Settings, selected: Sequence[Combination], levels: int) -> None:
     """Raise CaseError if the analysis of the finest mesh of a study needs more memory than this machine has."""
     memory = _memory()
-    for member in members:
-        coarsest = make_mesh(recipe(setup, member.element, 0), case.mesh if setup.generator is None else None)
+    for combination in selected:
+        coarsest = make_mesh(recipe(setup, combination.element, 0), case.mesh if setup.generator is None else None)
         unknowns = [coarsest.n_points * coarsest.dim * 2 ** (coarsest.dim * level) for level in range(levels)]
         n_fitting = sum(BYTES_PER_UNKNOWN * count <= memory for count in unknowns)
         if n_fitting < levels:
             raise CaseError(
-                f"level {levels - 1} of {member} would have about {unknowns[-1]:.2g} unknowns and take "
+                f"level {levels - 1} of {combination} would have about {unknowns[-1]:.2g} unknowns and take "
                 f"{BYTES_PER_UNKNOWN * unknowns[-1] / 1e9:.2g} GB of memory, of which this machine has {memory / 1e9:.2g}: "
                 f"give at most {max(n_fitting, 1)} levels"
             )
-        log.info("%s: up to about %d unknowns on level %d", member, unknowns[-1], levels - 1)
+        log.info("%s: up to about %d unknowns on level %d", combination, unknowns[-1], levels - 1)
 
 
 def _memory() -> float:
@@ -67,12 +67,12 @@ def check_study(case: Case) -> None:
     with in_file("[study.parameters]"):
         for name in study.get("parameters", {}):
             substitute(setup.data, {name: 1.0})
-    for member in setup.combinations if study else ():
-        with in_file(f"[study], {member}"):
-            job = job_of(case, setup, member, 0, label="", marks={})
-            if setup.by_shape and shape_of(member.element or "") == "quadrangles":
+    for combination in setup.combinations if study else ():
+        with in_file(f"[study], {combination}"):
+            job = job_of(case, setup, combination, 0, label="", marks={})
+            if setup.by_shape and shape_of(combination.element or "") == "quadrangles":
                 make_mesh(job.recipe, None)
-            if member.formulation in setup.options or setup.load_steps is not None:
+            if combination.formulation in setup.options or setup.load_steps is not None:
                 build_case(job.data, name=case.name, folder=case.folder, mesh=case.mesh)
 
 

@@ -76,7 +76,7 @@ def _comparison_with_theory(series: Series, quantity: str, split: Split) -> str:
     mesh_error = f"{percent(split.mesh)} is mesh error on the finest mesh {dofs}"
     if series.converges_to_theory(quantity) is False:
         return (
-            f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)} where the theory has "
+            f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}, and the theory gives "
             f"{number(split.theory, 6)}. That theory is exact for the bodies of the model, so this is not a model error: "
             f"{series.combination} does not converge to it on these meshes. Compare formulations (--formulations all), or "
             "let the meshes of the two sides match."
@@ -384,7 +384,7 @@ class Study(Report):
     """
 
     kind = "Mesh convergence"
-    picture = "mesh errors over the mesh size, the pressure of all levels over theory, the difference from theory"
+    picture = "mesh errors over the mesh size, the pressure of all levels and of the theory, the difference from theory"
     explanations = (
         "The limit is the value to which the results tend with mesh refinement, from a fit of value = limit + C h^order. It "
         f"lies within the error bar with a probability of {CONFIDENCE:.0%}. Orders between two levels are erratic, because "

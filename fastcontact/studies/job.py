@@ -186,12 +186,12 @@ def record_warnings() -> Iterator[list[str]]:
     texts += [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
 
 
-def job_of(case: Case, setup: Settings, member: Combination, level: int, **of_run: Any) -> Job:
-    """Return the job of a case with the element and the formulation of `member` on the mesh of a level.
+def job_of(case: Case, setup: Settings, combination: Combination, level: int, **of_run: Any) -> Job:
+    """Return the job of a case with the element and the formulation of `combination` on the mesh of a level.
 
     `of_run` are the other fields of a `Run`: its label, its marks and its size.
     """
-    data, mesh = case_data(setup, member), recipe(setup, member.element, level)
+    data, mesh = case_data(setup, combination), recipe(setup, combination.element, level)
     base = case.mesh if setup.generator is None else None
     return Job(name=case.name, data=data, pair=setup.pair, recipe=mesh, base=base, folder=case.folder, **of_run)
 

@@ -29,12 +29,12 @@ EXACT_THEORIES = (PressFit, HertzBox)
 LABELS = {
     "force": ("contact force", "force"),
     "pressure_max": ("largest pressure", "pressure"),
-    "pressure_pole": ("pressure in the middle", "pressure"),
+    "pressure_pole": ("pressure at the centre", "pressure"),
     "contact_radius": ("contact radius", "length"),
     "von_mises_max": ("largest von Mises stress", "pressure"),
     "von_mises_depth": ("depth of the largest von Mises stress", "length"),
-    "pressure_error": ("pressure against theory, relative L2 norm", ""),
-    "pressure_error_equal_force": ("pressure against theory at equal force, relative L2 norm", ""),
+    "pressure_error": ("error of the pressure, relative L2 norm", ""),
+    "pressure_error_equal_force": ("error of the pressure at equal force, relative L2 norm", ""),
 }
 # Standard quantities that are relative errors.
 RATIOS = tuple(name for name, (_, kind) in LABELS.items() if not kind)
@@ -46,7 +46,7 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     quantities["von_mises_max"], position = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
         quantities["von_mises_depth"] = _depth(case, pair, position)
-    for name in _of_probes_and_pairs(case):
+    for name in _probe_and_pair_names(case):
         if np.isfinite(value := measured(name, last, case.probes)):
             quantities[name] = value
     return quantities
@@ -54,7 +54,7 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
 
 def check_names(case: Case, names: Iterable[str]) -> None:
     """Raise CaseError if a name is not that of a quantity that `measure` may return for the case."""
-    known = [*LABELS, *_of_probes_and_pairs(case)]
+    known = [*LABELS, *_probe_and_pair_names(case)]
     for name in names:
         if name not in known:
             text = unknown("quantity", name, known)
@@ -62,10 +62,10 @@ def check_names(case: Case, names: Iterable[str]) -> None:
             raise CaseError(text if "did you mean" in text else text + further)
 
 
-def _of_probes_and_pairs(case: Case) -> list[str]:
+def _probe_and_pair_names(case: Case) -> list[str]:
     """Return the names of the quantities of the probes and contact pairs of a case, such as ``"fit.moment.z"``.
 
-    They are those of checks; pairs without the option that a quantity requires do not have it.
+    Checks use the same names. Quantities that require an option are omitted for pairs without this option.
     """
     kinematics = case.model.kinematics
     names = [f"{probe}.{kind}" for probe in case.probes for kind in defined(OF_PROBES, kinematics) if kind != "shear"]
@@ -120,7 +120,7 @@ def secondary(case: Case, pair: str) -> Surface:
 def contact_radius(contact: ContactResult) -> float:
     """Return the distance [length] from the contact centre at which the pressure vanishes.
 
-    It is NaN if the contact is open, if it has no edge, because the side is closed to its end, and if it is a ring.
+    It is NaN if the contact is open, if it is a ring, or if it has no edge because it extends to the end of the surface.
 
     Near the edge of a smooth contact, the square of the pressure is linear in the square of the distance; in Hertzian
     contact it is linear everywhere. A line is fitted to the closed nodes beyond 0.4 of the radius, except for the last two
@@ -187,7 +187,7 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
 def _peak_on_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | None:
     """Return the maximum, and its position, of a quartic fitted to nodes of the axis near node `top`, in its body.
 
-    The result is None if there are fewer than eight nodes, if they end next to `top`, or if the quartic has no maximum.
+    The result is None if there are fewer than eight nodes, or two on either side of `top`, or if the quartic has no maximum.
     """
     line = np.flatnonzero(np.abs(mesh.points[:, 0]) <= 1e-9 * np.abs(mesh.points).max())
     _, body = bodies(mesh)
@@ -255,7 +255,7 @@ def mesh_size(case: Case, pair: str | None) -> float:
 
 
 def theory_quantities(theory: Any, share: float = 1.0) -> dict[str, float]:
-    """Return the quantities of interest of a theory; `share` [-] is the fraction of its force in the model."""
+    """Return the quantities of interest of a theory; `share` [-] is the fraction of its force that acts on the model."""
     names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
     quantities = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
     if "force" in quantities:

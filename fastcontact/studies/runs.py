@@ -78,8 +78,8 @@ def convergence_study(
     quantities : sequence of str, or dict of str to callable
         Further quantities, in addition to the standard ones. For a case, their names, such as ``"C1.stress.yy"``,
         ``"C1.displacement.y"`` and ``"C1.pressure"`` at the point group C1. For a function, names of standard quantities,
-        or functions by name. Such a function receives the last `StepResult`, or the list of all steps if its argument is
-        called ``steps``, and returns a number.
+        or a mapping of names to functions. Such a function receives the last `StepResult`, or the list of all steps if its
+        argument is called ``steps``, and returns a number.
     theory : dict of str to float, optional
         Theoretical values of quantities of a function, by their names. A case has its theory in the table ``[theory.PAIR]``.
     executor : concurrent.futures.Executor, optional
@@ -140,10 +140,10 @@ def convergence_study(
         raise CaseError(f"levels = {levels} must be at least 1; an extrapolated limit needs 3")
     setup = settings(case)
     check_names(case, [*setup.quantities, *quantities])
-    members = combinations(setup, elements, formulations)
-    check_runs(levels * len(members))
-    check_levels(case, setup, members, levels)
-    jobs = [level_job(case, setup, member, level) for level in range(levels) for member in members]
+    selected = combinations(setup, elements, formulations)
+    check_runs(levels * len(selected))
+    check_levels(case, setup, selected, levels)
+    jobs = [level_job(case, setup, combination, level) for level in range(levels) for combination in selected]
     results = run_study(jobs, "no level could be solved", **options)
     return study_of_runs(case, jobs, results, [*setup.quantities, *quantities])
 
@@ -184,10 +184,10 @@ def _study_of_function(
     return Study(**function_fields(function, results), series=[series], failed={}, theory=None)
 
 
-def level_job(case: Case, setup: Settings, member: Combination, level: int) -> Job:
+def level_job(case: Case, setup: Settings, combination: Combination, level: int) -> Job:
     """Return the job that solves a case with one element type and formulation on the mesh of one level."""
-    marks = {"level": level, "element": member.element, "formulation": member.formulation}
-    return job_of(case, setup, member, level, label=f"{member} level {level}", marks=marks, size=level)
+    marks = {"level": level, "element": combination.element, "formulation": combination.formulation}
+    return job_of(case, setup, combination, level, label=f"{combination} level {level}", marks=marks, size=level)
 
 
 def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], further: Sequence[str]) -> Study:
@@ -197,23 +197,23 @@ def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], fu
     """
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
-        member = Combination(job.marks["element"], job.marks["formulation"])
-        by_combination.setdefault(member, []).append((job.marks["level"], result))
+        combination = Combination(job.marks["element"], job.marks["formulation"])
+        by_combination.setdefault(combination, []).append((job.marks["level"], result))
     checked = [name for check in case.checks if (name := check.quantity).partition(".")[0] in case.probes]
     theories = case.theories.get(settings(case).pair or "", {})
     theory, share = theories.get("theory"), theories.get("share", 1.0)
     compared = "at equal approach" if settings(case).pair in case.approach else "under the given load"
     series, failed = [], {}
-    for member, runs in by_combination.items():
+    for combination, runs in by_combination.items():
         if all("error" in result for _, result in runs):
-            failed[str(member)] = str(runs[0][1]["error"])
+            failed[str(combination)] = str(runs[0][1]["error"])
         else:
-            series.append(_series(member, runs, further, checked, (theory, share, compared)))
+            series.append(_series(combination, runs, further, checked, (theory, share, compared)))
     return Study(**report_fields(case), series=series, failed=failed, theory=theory)
 
 
 def _series(
-    member: Combination, results: list[tuple[int, Result]], further: Sequence[str], checked: Sequence[str],
+    combination: Combination, results: list[tuple[int, Result]], further: Sequence[str], checked: Sequence[str],
     theory: tuple[Any, float, str], asked: tuple[str, ...] = (),
 ) -> Series:  # fmt: skip
     """Return the series of one element type and formulation with its limits.
@@ -233,7 +233,7 @@ def _series(
     at_force, spread = _theory_at_force(*theory[:2], limits.get("force"))
     last = {key: solved[-1][1][key] for key in ("theory", "reference")}
     return Series(
-        member, levels, failed, **last, equal_force=at_force, equal_force_spread=spread, quantities=names, limits=limits,
+        combination, levels, failed, **last, equal_force=at_force, equal_force_spread=spread, quantities=names, limits=limits,
         exact_theory=isinstance(theory[0], EXACT_THEORIES), share=theory[1], compared=theory[2], asked=asked,
     )  # fmt: skip
 
@@ -257,9 +257,9 @@ def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
 
 # Default refinement level of the meshes of a sweep. Mesh errors of this level are usually smaller than the trends of
 # interest.
-LEVEL = 2
+DEFAULT_LEVEL = 2
 # Number of points of a curve of the theory.
-CURVE = 60
+CURVE_POINTS = 60
 
 
 @typed(CaseError)
@@ -392,7 +392,7 @@ def _points(
 
 
 def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: str | None) -> tuple[TheoryCurve, ...]:
-    """Return curves of the theory of a contact pair over the parameter drawn, one for each choice of the other parameters.
+    """Return curves of the theory of a contact pair over the plotted parameter, one for each choice of the others.
 
     There are none if the values of this parameter are not numbers or are all equal.
     """
@@ -402,9 +402,9 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
     if len(numbers) < len(values) or min(numbers) == max(numbers):
         return ()
     low, high = min(numbers), max(numbers)
-    x = np.geomspace(low, high, CURVE) if low > 0 else np.linspace(low, high, CURVE)
+    x = np.geomspace(low, high, CURVE_POINTS) if low > 0 else np.linspace(low, high, CURVE_POINTS)
     data, curves = data_of(case), []
-    for choice in (dict(zip(others, combination, strict=True)) for combination in itertools.product(*others.values())):
+    for choice in (dict(zip(others, values, strict=True)) for values in itertools.product(*others.values())):
         rows = [_theory_at(substitute(data, {first: float(value), **choice}), pair) for value in x]
         names = [name for name in rows[0] if all(name in row for row in rows)]
         theory = {name: np.array([row[name] for row in rows]) for name in names}
@@ -424,12 +424,12 @@ def _theory_at(data: dict[str, Any], pair: str | None) -> dict[str, float]:
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
     """Return the job that solves a case for one choice of parameter values."""
     setup = settings(case, substitute(data_of(case), choice))
-    member = one_combination(setup, element, formulation)
-    level = (LEVEL if setup.by_shape else 0) if level is None else level
+    combination = one_combination(setup, element, formulation)
+    level = (DEFAULT_LEVEL if setup.by_shape else 0) if level is None else level
     # Runs with the largest meshes start first, according to the number of points on level 0.
-    size = make_mesh(recipe(setup, member.element, 0), None).n_points if setup.generator is not None else 0
-    marks = {**choice, "combination": f"{member}, level {level}"}
-    return job_of(case, setup, member, level, label=label_of(choice), marks=marks, size=size)
+    size = make_mesh(recipe(setup, combination.element, 0), None).n_points if setup.generator is not None else 0
+    marks = {**choice, "combination": f"{combination}, level {level}"}
+    return job_of(case, setup, combination, level, label=label_of(choice), marks=marks, size=size)
 
 
 def function_name(function: Function) -> str:
@@ -438,7 +438,7 @@ def function_name(function: Function) -> str:
 
 
 def function_fields(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the fields of a `Report` that describe a function, whose text is its source, with the units of the `results`."""
+    """Return the fields of a `Report` that describe a function: name, title, source text, and units of the `results`."""
     try:
         text = inspect.getsource(function)
     except (OSError, TypeError):

@@ -90,7 +90,7 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     """
     data = data_of(case) if data is None else data
     study = data.get("study", {})
-    pair = study.get("contact") or next((combination.name for combination in case.model.contact), None)
+    pair = study.get("contact") or next((contact_pair.name for contact_pair in case.model.contact), None)
     formulations = {pair.name: pair.formulation for pair in case.model.contact}
     if pair is not None:
         check_known("contact pair in study.contact", pair, formulations, CaseError)

@@ -244,7 +244,7 @@ class Sweep(Report):
         values = [{point.values.get(name) for point in self.points} for name in self._main_quantities()]
         if any(len(theory) == 1 < len(computed) for theory, computed in zip(theories, values, strict=True)):
             remarks += [
-                "the theory is the same for all points: a parameter in [study.parameters] can change its keys, too"
+                "the theory is the same for all points: a parameter in [study.parameters] can change keys of the theory, too"
             ]
         return remarks
 

@@ -158,7 +158,7 @@ def test_adhesion_on_facets_longer_than_its_reach_tells_it():
     ball, law = fc.obstacles.Sphere((0.0, 1.0), 1.0), {"work": 3.5e-5, "strength": 0.1}
     model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -1e-3}, adhesion=law)
     criteria = fc.Criteria(max_geometry_updates=1)
-    with pytest.raises(fc.ConvergenceError, match=r"facets no longer than the reach of adhesion, 0\.0007, .* 'ball'"):
+    with pytest.raises(fc.ConvergenceError, match=r"facets no longer than the range of adhesion, 0\.0007, .* 'ball'"):
         fc.solve(model, 1, criteria=criteria)
 
 

@@ -423,7 +423,7 @@ def test_functions_that_are_no_conductance_and_bodies_that_no_heat_reaches():
     model = joined(bar(conductivity=1.0, expansion=1e-3), conductance=lambda p, g: next(numbers))
     model.fix_temperature("UPPER_TOP", 1.0)
     model.fix_temperature("LOWER_BOTTOM", 0.0)
-    with pytest.raises(fc.errors.ConvergenceError, match="heat and contact do not converge: after 60 times"):
+    with pytest.raises(fc.errors.ConvergenceError, match="heat and contact do not converge: after 60 exchanges"):
         fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
     model = joined(bar(conductivity=1.0), conductance=5.0, clearance=0.1)
     model.fix_temperature("UPPER_TOP", 1.0)

@@ -20,8 +20,8 @@ come from `PairOptions` through `Constraints`; parameters that are forces must b
 At a constraint on a symmetry plane or on an axis, supports prevent slip along one tangent or along both. The functions at the
 end of this file detect such held tangents by the compliance of each constraint, and rotate the two tangents of a constraint
 in 3D so that one of them is the direction in which slip is prevented. The compliance of m constraints, without their
-coupling, is an array (1 + k, 1 + k, m): the changes of the gap and of the k slips of a constraint by its normal force and its
-k tangential forces [length / force], in this order.
+coupling, is an array (1 + k, 1 + k, m): the changes of the gap and of the k slips of a constraint due to its normal force and
+its k tangential forces [length / force], in this order.
 """
 
 from __future__ import annotations

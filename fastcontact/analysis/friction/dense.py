@@ -31,9 +31,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION,
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
 EDGES, LARGEST = (8, 32), 2500
 # If slips are linearly dependent, tangential forces are not unique. Examples are nodes that belong to several surfaces, and
-# nodes that are supported on one side of the contact. F counts as singular if a squared pivot of its scaled Cholesky factor
-# is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to the diagonal entries of slips and
-# equations: the first value of REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this
+# nodes that are supported on one side of the contact. F is regarded as singular if a squared pivot of its scaled Cholesky
+# factor is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to the diagonal entries of slips
+# and equations: the first value of REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this
 # compliance exceeds SINGLE_PRECISION, relative to the gaps and slips without forces, the forces are not in equilibrium: the
 # bodies jam.
 REGULARISATION = ROUND_OFF, LENGTH_ROUND_OFF

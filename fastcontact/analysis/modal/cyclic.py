@@ -1,8 +1,8 @@
 """Waves in a ring of equal sectors, of which one is modelled (Thomas, Int. J. Numer. Meth. Engng 14, 1979).
 
 A mode of d nodal diameters is a wave: the displacement of sector k is that of the first one, rotated k times and
-multiplied by ``exp(2 pi i d k / N)``. Complex matrices A are represented by real ones of twice the size, ``[[Re A, -Im
-A], [Im A, Re A]]``, except for d = 0 and d = N / 2, where the phase factors are real.
+multiplied by ``exp(2 pi i d k / N)``. Complex matrices A are represented by real ones of twice the size,
+``[[Re A, -Im A], [Im A, Re A]]``, except for d = 0 and d = N / 2, where the phase factors are real.
 """
 
 from __future__ import annotations

@@ -144,8 +144,8 @@ class Modes(Shapes):
             )
         if turning:
             remarks.append(
-                f"{turning} of {len(self)} modes with omega^2 < 0 are rotations of rigid bodies, which loads of constant "
-                "direction turn over"
+                f"{turning} of {len(self)} modes with omega^2 < 0 are rotations of rigid bodies that loads of constant "
+                "direction overturn"
             )
         return remarks
 

@@ -116,7 +116,7 @@ class MovingContact:
         return np.asarray((modified(increment).at(self.u) - modified(-increment).at(self.u)) / (2.0 * increment))
 
     @cached_property
-    def step(self) -> float:
+    def increment(self) -> float:
         """Increment by which points are moved [length]."""
         points = self.problem.model.mesh.points
         facets = [nodes for side in self._surfaces() for nodes in side.node_positions(points)]
@@ -155,7 +155,7 @@ class MovingContact:
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
         """Return half the difference of the two `derivatives` where points project onto an edge between two facets."""
         jump, n = csr_array(0.5 * (forward - backward)), len(self.u)
-        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
+        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.increment
         row = entry_rows(jump)
         # Half the difference of one-sided derivatives is larger at a kink. Pressures follow from forces: they are smooth
         # where forces are.
@@ -223,7 +223,7 @@ class MovingContact:
 
     def _one_sided(self, motion: Array) -> tuple[Array, Array]:
         """Return the forward and the backward derivative of `at` along a motion (n_dofs,) of the points."""
-        increment = self.step / (largest(motion) or 1.0)
+        increment = self.increment / (largest(motion) or 1.0)
 
         def at(distance: float) -> Array:
             shift = distance * motion

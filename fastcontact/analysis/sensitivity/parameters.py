@@ -316,7 +316,7 @@ def _motion_derivatives(contact: MovingContact, parameter: Label) -> Change:
     size = float(np.abs(motion).max())
     if size == 0.0:
         return _zero_change(contact)
-    return replace(_zero_change(contact), sample=contact.parameter_derivative(with_increment, contact.step / size))
+    return replace(_zero_change(contact), sample=contact.parameter_derivative(with_increment, contact.increment / size))
 
 
 def _check_clearance(model: Model, parameter: Label) -> None:
@@ -335,7 +335,7 @@ def _clearance_derivatives(contact: MovingContact, parameter: Label) -> Change:
         worn = {**contact.state.worn, name: Worn(np.full(count, increment), np.zeros(count))}
         return replace(contact, state=replace(contact.state, worn=worn))
 
-    return replace(_zero_change(contact), sample=contact.parameter_derivative(with_increment, contact.step))
+    return replace(_zero_change(contact), sample=contact.parameter_derivative(with_increment, contact.increment))
 
 
 _CONSTANT = _constant_of, _constant_derivatives

@@ -38,8 +38,8 @@ def test_a_contact_problem_that_does_not_settle_is_returned():
 
     found = bodies_at(DOFS).settle(lambda anchor: solve_at(0.5 * anchor), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert not found.slack
-    assert not found.state.settled
-    assert found.state.iterations == found.positions == len(calls) == 2
+    assert not found.solution.settled
+    assert found.solution.iterations == found.positions == len(calls) == 2
 
 
 def test_anchors_follow_what_contact_holds():

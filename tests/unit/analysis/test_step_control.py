@@ -11,7 +11,7 @@ from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.analysis import geometry_loop, step_halving
-from fastcontact.analysis.convergence_messages import geometry_moves
+from fastcontact.analysis.convergence_messages import geometry_not_converged
 from fastcontact.analysis.problem import prepare
 from fastcontact.mesh.generate import block
 
@@ -96,14 +96,14 @@ def told_for(changes):
     model, criteria = SimpleNamespace(mesh=mesh), fc.Criteria()
     problem = SimpleNamespace(model=model, criteria=criteria, shape=(4, 2), pairs={"still": still, "joint": pair})
     history = [{"displacement_change": change, "active": 3} for change in changes]
-    return geometry_moves(problem, history, np.arange(8.0), 60)
+    return geometry_not_converged(problem, history, np.arange(8.0), 60)
 
 
 @pytest.mark.parametrize(
     ("changes", "words", "enough"),
     [
         ([1e-2 * 0.5**k for k in range(20)], "Use more updates (Criteria.max_geometry_updates), multipliers", "2e-08"),
-        ([0.1, *[1.2e-4, 0.9e-4] * 10], "These changes do not decline. Use multipliers", "1e-04"),
+        ([0.1, *[1.2e-4, 0.9e-4] * 10], "These changes do not decrease. Use multipliers", "1e-04"),
     ],
 )
 def test_the_remedy_follows_from_how_the_geometry_moves(changes, words, enough):
