@@ -73,13 +73,15 @@ class ActiveDofs:
         supported unknowns are eliminated, its row contains only small entries of neighbouring nodes. Rows whose entries are
         all below the fraction NOTABLE of the largest entry before the elimination are set to zero. With remaining entries of
         1e-16, multipliers of a mortar joint between two flanges with a fixed edge reached 1e23; with entries of 1e-7, active
-        sets did not converge.
+        sets did not converge. If the constraint is soft, its gap nevertheless determines its normal force.
         """
         rows, offsets = [], np.vstack([constraints.gap0, constraints.slip0])
         for k, R in enumerate((constraints.B, *constraints.tangents)):
             reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
             rows.append(without_remnants(csr_array(reduced[:, self._unknowns]), R, NOTABLE))
-        return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tuple(rows[1:]), slip0=offsets[1:])
+        prescribed = constraints.usable & (constraints.softness > 0.0) & (np.diff(rows[0].indptr) == 0)
+        tangents, slip0 = tuple(rows[1:]), offsets[1:]
+        return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tangents, slip0=slip0, prescribed=prescribed)
 
     def unknowns(self, u: Array, lift: Array) -> Array:
         """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints."""

@@ -118,6 +118,7 @@ def cohesive_rows(
         B=csr_array(vstack([constraints.B, *constraints.tangents], format="csr")),
         gap0=np.concatenate([constraints.gap0 - np.where(intact, initial_gap, 0.0), *slip0]) - layer.rest.ravel(),
         equality=np.tile(intact, len(jump)),
+        prescribed=np.zeros(jump.size, bool),
         softness=1.0 / (slope * law.stiffness * constraints.areas).ravel(),
         positions=np.tile(constraints.positions, (len(jump), 1)),
         areas=np.tile(constraints.areas, len(jump)),
