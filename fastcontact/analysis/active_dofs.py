@@ -78,7 +78,8 @@ class ActiveDofs:
         is removed from its row.
         """
         rows, offsets = [], np.vstack([constraints.gap0, constraints.slip0])
-        least = [np.where(constraints.softness > 0.0, SINGLE_PRECISION, NOTABLE), *[NOTABLE] * len(constraints.tangents)]
+        least = np.full((1 + len(constraints.tangents), len(constraints)), NOTABLE)
+        least[0, constraints.softness > 0.0] = SINGLE_PRECISION
         for k, R in enumerate((constraints.B, *constraints.tangents)):
             reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
             rows.append(without_remnants(csr_array(reduced[:, self._unknowns]), R, least[k]))

@@ -17,7 +17,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.cohesion import ELASTIC, Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.round_off import SINGLE_PRECISION, TINY
+from fastcontact.round_off import DIFFERENCES, SINGLE_PRECISION, TINY
 
 # Stiffness of the linearised layer where it softens, relative to that of the intact layer. It is the magnitude of the ratio
 # of the two slopes of the default law. With a smaller ratio, the iteration for a beam glued at its nodes does not converge.
@@ -83,6 +83,27 @@ class Layer:
         return Bond(self.before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ squares))
 
 
+@dataclass(frozen=True, eq=False)
+class Softening:
+    """Derivatives of the gaps of the linearised law with respect to the separations at which it is linearised.
+
+    Attributes
+    ----------
+    rows : csr_array ((1 + k) m, n_dofs)
+        Derivatives of the separations along the axes of the constraints [-].
+    correction : ndarray (1 + k, 1 + k, m)
+        Derivatives of the gaps with respect to these separations, zero where the layer does not soften [-].
+    """
+
+    rows: csr_array
+    correction: Array
+
+    def along(self, du: Array) -> tuple[Array, Array]:
+        """Return the directional derivatives along `du` of forces, which are omitted, and of gaps; see `Linearised`."""
+        jump = (self.rows @ du.ravel()).reshape(self.correction.shape[1:])
+        return np.empty(0), np.einsum("abm,bm->am", self.correction, jump).reshape(1, -1)
+
+
 def cohesive_rows(
     law: CohesiveLaw, constraints: Constraints, config: Configuration, initial_gap: Array, body_stiffness: float
 ) -> Constraints:
@@ -115,18 +136,25 @@ def cohesive_rows(
     secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(jump), 1))
     compression = max(1.0, COMPRESSION * body_stiffness / law.stiffness) if law.reversible else 1.0
     secant[0, opening < 0.0] = compression
-    softening = intact & (damage > (0.0 if law.reversible else before.damage)) & (1.0 - damage > SOFTENING_SLOPE)
+    growing = intact & (damage > (0.0 if law.reversible else before.damage))
+    softening = growing & (1.0 - damage > SOFTENING_SLOPE)
     axes, axis = _axes_along(np.where(softening, np.stack([np.maximum(opening, 0.0), *slips]), 0.0))
     slope = secant.copy()
     slope[axis[softening], np.flatnonzero(softening)] = SOFTENING_SLOPE
     rest = np.einsum("abm,bm->am", axes, jump) * (1.0 - secant / slope)
     rotation = csr_array(block_array([[diags_array(entries) for entries in row] for row in axes], format="csr"))
     gap0 = rotation @ np.concatenate([constraints.gap0 - np.where(intact, initial_gap, 0.0), *slip0])
+    B = csr_array(rotation @ vstack([constraints.B, *constraints.tangents], format="csr"))
+    at = np.flatnonzero(growing)
+    derivative = _derivative(law, jump[:, at], compression)
+    correction = np.zeros_like(axes)
+    correction[..., at] = np.einsum("acm,cdm,dbm->abm", axes[..., at], derivative, axes[..., at]) / slope[:, None, at]
+    correction[..., at] -= np.eye(len(jump))[..., None]
     default = np.empty(0)
     layer = Layer(law, constraints.directions, constraints.areas, before, damage, jump, axes, rest, compression)
     return replace(
         constraints,
-        B=csr_array(rotation @ vstack([constraints.B, *constraints.tangents], format="csr")),
+        B=B,
         gap0=gap0 - rest.ravel(),
         equality=np.tile(intact, len(jump)),
         prescribed=np.zeros(jump.size, bool),
@@ -134,10 +162,27 @@ def cohesive_rows(
         positions=np.tile(constraints.positions, (len(jump), 1)),
         areas=np.tile(constraints.areas, len(jump)),
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(jump)),
-        compliance=None, tangents=(), directions=(), tied=layer,
+        compliance=None, tangents=(), directions=(), tied=layer, geometry=lambda *_: Softening(B, correction),
         friction=default, slip0=default, tangential_softness=default, elastic_slip=default, low_rank_compliance=default,
-        branches=np.where(softening, 1 + axis, 0) + 4 * (opening < 0.0) + 8 * ~intact,
+        branches=np.where(growing, 1 + axis, 0) + 4 * (opening < 0.0) + 8 * ~intact,
     ).without(np.concatenate([zeros > 0.0, *[~intact] * len(slip0)]))  # fmt: skip
+
+
+def _derivative(law: CohesiveLaw, jump: Array, compression: float) -> Array:
+    """Return the derivatives (1 + k, 1 + k, q) of the tractions at separations (1 + k, q) where the layer softens.
+
+    They are relative to the stiffness of the intact layer. `compression` is the relative stiffness in compression.
+    """
+
+    def traction(jump: Array) -> Array:
+        sliding = np.linalg.norm(jump[1:], axis=0)
+        traction = (1.0 - law.damage(jump[0], sliding, np.zeros_like(sliding))) * jump
+        traction[0] = np.where(jump[0] < 0.0, compression * jump[0], traction[0])
+        return traction
+
+    step = DIFFERENCES * np.linalg.norm(jump, axis=0)
+    units = np.eye(len(jump))[:, :, None] * step
+    return np.stack([(traction(jump + unit) - traction(jump - unit)) / (2.0 * step) for unit in units], axis=1)
 
 
 def _axes_along(vectors: Array) -> tuple[Array, Indices]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, made_of, supported, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -262,3 +262,57 @@ def test_a_penalty_carries_pressure_and_friction_where_supports_prescribe_its_pe
     assert force[0] == pytest.approx(-drawn, rel=1e-8)
     assert integral == pytest.approx(force[0], rel=0.03)
     assert 100.0 * width < force[0] < 140.0 * width
+
+
+@pytest.mark.filterwarnings("ignore:.*coincide with|.*rotat|.*bends")
+@pytest.mark.parametrize("options", FORMULATIONS)
+@pytest.mark.parametrize("case", ["upper", "lower", "turned", "finite", "3d"])
+def test_an_end_loaded_split_grows_as_linear_elastic_fracture_mechanics_predicts(options, case):
+    """Delamination in mode II of a cantilever with deflected arms; both arms are clamped at the other end.
+
+    Williams (1989) adds 0.42 chi h to the crack, with chi = 0.677 for these arms: J. Strain Analysis 24, 207-214.
+    """
+    E, h, a0, L, energy, deflection = 70e3, 3.0, 60.0, 100.0, 0.8, 12.0
+    if case == "3d":
+        arms = [fc.generate.box((L, 2.0, h), (50, 1, 2), "hex8", (0.0, 0.0, z), name="BODY") for z in (0.0, -h)]
+        right = "XMAX"
+    else:
+        arms = [fc.generate.block((L, h), (50, 2), "quad8", (0.0, y), name="BODY") for y in (0.0, -h)]
+        right = "RIGHT"
+    mesh = united(UP_=arms[0], LO_=arms[1])
+    x, across = mesh.points[:, 0], mesh.dim - 1
+    ends = np.flatnonzero((x == 0.0) & (np.abs(mesh.points[:, across]) == h))
+    mesh = mesh.with_groups(points={"ENDS": ends})
+
+    def glued(X):
+        return (np.abs(X[:, across]) < 1e-9) & (X[:, 0] > a0 - 1e-9)
+
+    for body in ("UP", "LO"):
+        mesh = mesh.with_facet_group(f"{body}_GLUE", glued, of=f"{body}_BODY")
+    axes = np.eye(3)
+    if case == "turned":
+        mesh, (c, s) = fc.generate.transformed(mesh, rotate=30.0), (np.cos(np.pi / 6), np.sin(np.pi / 6))
+        axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    strain = "finite" if case == "finite" else "small"
+    model = made_of(
+        mesh,
+        "3d" if case == "3d" else "plane_stress",
+        fc.LinearElastic(E=E, nu=0.0, incompatible_modes=case == "3d"),
+        strain,
+    )
+    model.prescribe("ENDS", axes=axes, **{"xyz"[across]: -deflection})
+    supported(model, **{f"{body}_{right}": "xyz"[: mesh.dim] for body in ("UP", "LO")})
+    sides = ("LO_GLUE", "UP_GLUE") if case == "lower" else ("UP_GLUE", "LO_GLUE")
+    law = {"strength": 15.0, "energy": 0.3, "shear_strength": 20.0, "shear_energy": energy}
+    model.add_contact("glue", secondary=sides[0], primary=sides[1], cohesion=law, **options)
+    before, after = fc.solve(model, [0.2, 0.6])
+    width = 2.0 if case == "3d" else 1.0
+    loads = [-(step.reaction[ends] @ axes[across, : mesh.dim]).sum() / width for step in (before, after)]
+    a = np.linspace(a0, 0.9 * L, 301) + 0.42 * 0.677 * h
+    assert loads[0] == pytest.approx(0.2 * deflection * 2.0 * E * h**3 / (3.0 * a[0] ** 3 + L**3), rel=0.04)
+    growing = np.sqrt(4.0 * energy * E * h**3 / 9.0) / a  # load per width at each length of the crack
+    deflections = growing * (3.0 * a**3 + L**3) / (2.0 * E * h**3)
+    assert deflections[0] < 0.5 * deflection
+    assert loads[1] == pytest.approx(np.interp(0.6 * deflection, deflections, growing), rel=0.02)
+    damage = after.contact["glue"].damage
+    assert 0.1 < (damage > 0.999).mean() < 0.6
