@@ -16,6 +16,7 @@ from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.sparse_rows import without_remnants
+from fastcontact.round_off import SINGLE_PRECISION
 
 
 class ActiveDofs:
@@ -76,13 +77,18 @@ class ActiveDofs:
         supported unknowns are eliminated, its row contains only small entries of neighbouring nodes. Rows whose entries are
         all below the fraction NOTABLE of the largest entry before the elimination are set to zero. With remaining entries of
         1e-16, multipliers of a mortar joint between two flanges with a fixed edge reached 1e23; with entries of 1e-7, active
-        sets did not converge.
+        sets did not converge. If the constraint is soft, its gap nevertheless determines its normal force, and only round-off
+        is removed from its row.
         """
         rows, offsets = [], np.vstack([constraints.gap0, constraints.slip0])
+        least = np.full((1 + len(constraints.tangents), len(constraints)), NOTABLE)
+        least[0, constraints.softness > 0.0] = SINGLE_PRECISION
         for k, R in enumerate((constraints.B, *constraints.tangents)):
             reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
-            rows.append(without_remnants(csr_array(reduced[:, self._unknowns]), R, NOTABLE))
-        return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tuple(rows[1:]), slip0=offsets[1:])
+            rows.append(without_remnants(csr_array(reduced[:, self._unknowns]), R, least[k]))
+        prescribed = constraints.usable & (constraints.softness > 0.0) & (np.diff(rows[0].indptr) == 0)
+        tangents, slip0 = tuple(rows[1:]), offsets[1:]
+        return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tangents, slip0=slip0, prescribed=prescribed)
 
     def unknowns(self, u: Array, lift: Array) -> Array:
         """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints."""

@@ -212,8 +212,10 @@ def _closed_nodes(
         # Nodes beyond the end of the other side are unpaired, but parts of their facets may face it.
         closed = np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     else:
-        # Nodes of a cohesive layer are closed under tension as well.
-        magnitude = side_pressure if pair.options.cohesion is None else np.abs(side_pressure)
+        magnitude = side_pressure
+        if constraints.tied is not None:  # nodes of a cohesive layer are closed under tension and shear as well
+            tangential = constraints.tied.forces(multiplier)[1]
+            magnitude = sum((np.abs(field.over_whole_side(t)) for t in tangential.T), np.abs(side_pressure))
         closed = field.closed_nodes(active, gap, magnitude)
         never_opening = pair.never_opening(pair.points[pair.secondary.points], configuration)
         closed = closed | (never_opening & np.isfinite(gap))

@@ -23,7 +23,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged, nearest_nodes
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction_increments import FrictionIncrements
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
@@ -255,6 +255,8 @@ class _Mixing:
     def __init__(self, step: StepContext) -> None:
         self._step, self.accelerated = step, None
         self._last_state, self._earlier_states, self._cycles = b"", set[bytes](), False
+        # Start of the last Newton step with cohesive layers, the step, the slope at its start, the fraction that is taken.
+        self._line: tuple[Array, Array, float, float] | None = None
         self._newton, self._change, self.contraction = step.linearises_contact, np.inf, np.inf
 
     accelerated: Anderson | None
@@ -265,21 +267,34 @@ class _Mixing:
         """Return the displacements (k,) for the next pairing, of the components of `Problem.dofs` [length].
 
         After an `inexact` solution, these are the displacements of the solution, `displacement` (k,). The geometry has
-        converged if changes are below `tolerance` [length]. Newton's method is abandoned once changes increase,
-        because it does not converge if nodes alternate between facets. It is also omitted if the next solution alone is
-        expected to converge, because a solution without a Newton step is cheaper.
+        converged if changes are below `tolerance` [length]. Newton's method is abandoned once changes increase, because it
+        does not converge if nodes alternate between facets. With cohesive layers, its steps are shortened instead. It is also
+        omitted if the next solution alone is expected to converge, because a solution without a Newton step is cheaper.
         """
         solution, before, change = settled.solution, last_update.before, last_update.change
-        self._newton, self._change = self._newton and change <= self._change, change
-        if self._newton and solution.settled and SAFETY * self.contraction * change > tolerance:
-            newton_result = newton_step(self._step, settled, before, displacement, tolerance / change)
-            if newton_result is not None:
-                next_pairing, self.contraction = newton_result
-                return next_pairing
+        if (shortened := self._shortened_step(before, displacement)) is not None:
+            return shortened
         branches = settled.constraints.branches
         # While this state is constant, the solution depends smoothly on the geometry.
         state = solution.active.tobytes() + (b"" if branches is None else branches.tobytes())
         same_state = self._last_state == state
+        declines = self._newton and change <= self._change
+        self._newton = declines or (branches is not None and (same_state or self._line is not None))
+        if branches is not None and change > SAFETY * self.contraction * self._change:
+            self.contraction = np.inf  # it was determined with other branches
+        self._line, self._change = None, change
+        if self._newton and solution.settled and SAFETY * self.contraction * change > tolerance:
+            newton_result = newton_step(self._step, settled, before, displacement, tolerance / change)
+            if newton_result is not None:
+                next_pairing, self.contraction = newton_result
+                if branches is None:
+                    return next_pairing
+                self._last_state, step = state, next_pairing - before
+                if (slope := float(step @ (displacement - before))) > 0.0:
+                    self._line = before, step, slope, 1.0
+                    return next_pairing
+                self.accelerated = None  # the step would increase the energy, which the solution decreases
+                return displacement
         self._cycles |= not (same_state or self._newton) and state in self._earlier_states
         self._last_state = state if solution.settled else b""
         self._earlier_states.add(self._last_state)
@@ -291,6 +306,22 @@ class _Mixing:
             problem = self._step.problem
             self.accelerated = Anderson(DEPTH, problem.dofs.compared, problem.solver.iterative)
         return self.accelerated.mixed(before, displacement)
+
+    def _shortened_step(self, before: Array, image: Array) -> Array | None:
+        """Return a shorter Newton step if the last one, which ends at `before` (k,), is too long; None otherwise.
+
+        Where cohesive layers soften, a step that is too long increases the energy. The derivative of the energy along the
+        step has the opposite sign of the product of the step with the change to the solution, `image` (k,).
+        """
+        if self._line is None:
+            return None
+        start, step, slope, fraction = self._line
+        end_slope = float(step @ (image - before))
+        if end_slope >= -0.5 * slope or fraction <= 2.0**-HALVINGS:
+            return None
+        fraction *= min(max(slope / (slope - end_slope), 0.1), 0.5)
+        self._line = start, step, slope, fraction
+        return start + fraction * step
 
 
 def newton_step(
@@ -341,8 +372,8 @@ def newton_step(
     # With the tolerance `accuracy` itself, load steps of plastic bodies take 10 % more pairings.
     v, _ = gmres(system, changed / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
     response_size = largest(largest_change * v - changed)
-    # Far from the solution, a step in which the response exceeds the change itself is unreliable.
-    if not response_size <= largest_change:
+    # Far from the solution, a step in which the response exceeds the change itself is unreliable, except where layers soften.
+    if not response_size <= (largest_change if constraints.branches is None else np.inf):
         return None
     next_pairing, determined = image.copy(), dofs.determined
     if len(determined) > len(where):  # there are springs of floating bodies
@@ -359,7 +390,7 @@ def _linearised(
     geometries = []
     for name, rows in constraints.rows.items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
-        if part.tied is not None or not multiplier.any():
+        if (part.tied is not None and part.geometry is None) or not multiplier.any():
             continue
         if part.geometry is None:
             return []

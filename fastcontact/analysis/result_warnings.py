@@ -155,10 +155,12 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
     count = sum(int(nodes[block.local].all(axis=1).sum()) for block in pair.secondary.blocks)
     if count:
         where = np.array2string(pair.points[pair.secondary.points[nodes]].mean(axis=0), precision=4)
+        friction = ", as is friction that depends on them" if pair.friction else ""
         yield (
             f"contact '{contact.name}': supports hold {count} of the {pair.secondary.n_facets} facets of "
             f"'{pair.secondary.group}' and the opposite facets, near {where}: tractions in the held directions are "
-            "undetermined there and reported as 0, and the reactions include their forces. Free the nodes of one side there"
+            f"undetermined there and reported as 0{friction}. The reactions include their forces. Free the nodes of one side "
+            "there"
         )
 
 

@@ -236,6 +236,8 @@ class Constraints:
         Data of a tied pair or a cohesive layer, if the constraints are its equations.
     geometry : Geometry, optional
         Derivatives of B and of the gaps with respect to the displacements; None if they are zero or not available.
+    prescribed : ndarray of bool (m,)
+        Constraints with empty rows of B whose gaps supports prescribe. Their softness determines their forces.
     """
 
     B: csr_array
@@ -261,12 +263,13 @@ class Constraints:
     wetted: Wetted | None = None
     coupled_directions: tuple[Array, ...] = ()
     geometry: Geometry | None = None
+    prescribed: Mask = field(default_factory=np.empty(0, bool).copy)
 
     def __post_init__(self) -> None:
         k, m = len(self.tangents), len(self.gap0)
         shapes: dict[str, tuple[int, ...]] = {"low_rank_compliance": (1 + k, m, 0)}
         shapes |= dict.fromkeys(("slip0", "elastic_slip"), (k, m))
-        shapes |= dict.fromkeys(("friction", "equality", "softness", "tangential_softness"), (m,))
+        shapes |= dict.fromkeys(("friction", "equality", "softness", "tangential_softness", "prescribed"), (m,))
         for name, shape in shapes.items():
             if not (values := getattr(self, name)).size:
                 object.__setattr__(self, name, np.zeros(shape, values.dtype))
@@ -277,7 +280,7 @@ class Constraints:
     @property
     def usable(self) -> Mask:
         """Constraints (m,) that can close."""
-        return np.asarray(np.diff(self.B.indptr) > 0)
+        return np.asarray((np.diff(self.B.indptr) > 0) | self.prescribed)
 
     @property
     def normal_compliance(self) -> Compliance | None:

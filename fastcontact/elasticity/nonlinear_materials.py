@@ -73,7 +73,7 @@ class ElasticPlastic(NonlinearElastic):
         Young's modulus [pressure] and Poisson's ratio [-].
     yield_stress : float
         Initial yield stress in uniaxial tension [pressure].
-    hardening : sequence of (float, float)
+    hardening : sequence of (float, float), optional
         Isotropic hardening: pairs of equivalent plastic strain [-], ascending from zero, and yield stress [pressure]. The
         yield stress is interpolated linearly, and is constant beyond the last pair. By default, the material is perfectly
         plastic. The first pair, (0, `yield_stress`), may be omitted.
@@ -112,8 +112,9 @@ class ElasticPlastic(NonlinearElastic):
 
     def _table(self) -> tuple[tuple[float, float], ...]:
         """Return the hardening table, which begins at zero plastic strain; raise ModelError if it is not valid."""
+        pairs = () if self.hardening is None else self.hardening
         try:
-            rows = np.array([[float(value) for value in pair] for pair in self.hardening]).reshape(-1, 2)
+            rows = np.array([[float(value) for value in pair] for pair in pairs]).reshape(-1, 2)
         except (TypeError, ValueError, OverflowError):
             is_slope = isinstance(self.hardening, float | int) and 0.0 <= self.hardening <= sys.float_info.max
             slope = self.hardening if is_slope else self.yield_stress

@@ -96,11 +96,11 @@ def taken(matrix: csr_array, rows: Indices) -> csr_array:
     return matrix if len(rows) == matrix.shape[0] else matrix[rows]
 
 
-def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
+def without_remnants(matrix: csr_array, origin: csr_array, least: Array | float) -> csr_array:
     """Return the matrix (m, n) without the entries of rows that consist of round-off.
 
-    The entries of a row are removed if none of them exceeds `least` times the largest entry of the same row of `origin`, in
-    absolute values.
+    The entries of a row are removed if none of them exceeds `least`, a number or one for each row, times the largest entry of
+    the same row of `origin`, in absolute values.
     """
     significant = _row_maxima(matrix) > least * _row_maxima(origin)
     return matrix if significant.all() else scaled(matrix, significant)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, made_of, supported, united
 from pairwise import first_of
 from refusals import refused
 
@@ -178,3 +178,135 @@ def test_what_is_refused():
     model.materials.clear()
     model.add_material(fc.LinearElastic(E=1.0, nu=0.0, density=1.0))
     refused(fc.ModelError, "cohesion", fc.modes, model, n=1)
+
+
+def sheared_strips(layer, pressed=0.0, element="quad4", swap=False, angle=0.0, divisions=12, solver="direct"):
+    """Two strips of 60 by 3 (by 4) with a layer between them, drawn along it; all nodes are held along its normal."""
+    if element == "hex8":
+        strips = [
+            fc.generate.box((60.0, 4.0, 3.0), (n, 1, 1), element, (0.0, 0.0, z), name="BODY")
+            for n, z in ((12, 0), (divisions, -3))
+        ]
+    else:
+        strips = [
+            fc.generate.block((60.0, 3.0), (n, 1), element, (0.0, y), name="BODY")
+            for n, y in ((12, 0), (divisions, -3))
+        ]
+    mesh = united(UP_=strips[0], LO_=strips[1])
+    left, right, bottom, top = ("LEFT", "RIGHT", "BOTTOM", "TOP") if mesh.dim == 2 else ("XMIN", "XMAX", "ZMIN", "ZMAX")
+    axes, across = np.eye(3), "xyz"[mesh.dim - 1]
+    if mesh.dim == 2:
+        mesh, (c, s) = (
+            fc.generate.transformed(mesh, rotate=angle),
+            (np.cos(np.radians(angle)), np.sin(np.radians(angle))),
+        )
+        axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    model = elastic_model(mesh, "plane_stress" if mesh.dim == 2 else "3d", E=70e3, nu=0.0)
+    model.prescribe("UP_BODY", axes=axes, **{across: -pressed})
+    model.fix("LO_BODY", across, axes=axes)
+    model.prescribe(f"UP_{left}", axes=axes, x=-0.02)
+    model.fix(f"LO_{right}", "x", axes=axes)
+    if mesh.dim == 3:
+        supported(model, UP_BODY="y", LO_BODY="y")
+    sides = (f"LO_{top}", f"UP_{bottom}") if swap else (f"UP_{bottom}", f"LO_{top}")
+    model.add_contact("layer", secondary=sides[0], primary=sides[1], **layer)
+    (step,) = fc.solve(model, 1, linear_solver=solver)
+    contact, axes = step.contact["layer"], axes[: mesh.dim, : mesh.dim]
+    drawn, up = (axes @ step.reaction[mesh.points_of(group)].sum(axis=0) for group in (f"UP_{left}", "UP_BODY"))
+    force = (-1.0 if swap else 1.0) * axes @ contact.force
+    place, shear, area = contact.coordinates @ axes[0], contact.shear @ axes[0], 5.0 if mesh.dim == 2 else 10.0
+    integral = area * abs((shear * np.where(np.abs(place - 30.0) > 29.0, 0.5, 1.0)).sum())
+    return step.warnings, drawn[0], up[-1], force, integral, contact
+
+
+STRIPS = ({}, {"swap": True}, {"angle": 30.0}, {"element": "hex8"}, {"divisions": 17}, {"solver": "amg"})
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize(
+    "case",
+    [*STRIPS, {"pressed": -0.005}, {"pressed": 0.002}],
+)
+def test_a_layer_in_shear_whose_nodes_are_held_along_its_normal_has_tractions(formulation, case):
+    law = {"strength": 20.0, "energy": 0.8, "stiffness": 25e3}
+    told, drawn, up, force, integral, contact = sheared_strips({"cohesion": law, **formulation}, **case)
+    assert not any("undetermined" in text for text in told)
+    assert contact.active.all()
+    assert force[0] == pytest.approx(-drawn, rel=1e-8)
+    width, pressed = 4.0 if case.get("element") == "hex8" else 1.0, case.get("pressed", 0.0)
+    assert force[0] > 100.0 * width  # of 140 for a rigid layer
+    assert integral == pytest.approx(force[0], rel=0.03)
+    assert up == pytest.approx(-force[-1], rel=1e-8, abs=1e-8)
+    if pressed > 0.0:  # the sides slide a little past their ends
+        assert up == pytest.approx(-25e3 * pressed * 60.0, rel=1e-4)
+    elif pressed < 0.0:
+        assert up > 1000.0
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("case", STRIPS)
+def test_a_penalty_carries_pressure_and_friction_where_supports_prescribe_its_penetration(formulation, case):
+    layer = {"penalty": [(0.0, 0.0), (1.0, 1e4)], "friction": 0.3, **formulation}
+    told, drawn, up, force, integral, contact = sheared_strips(layer, pressed=0.005, **case)
+    assert not any("undetermined" in text or "carries nothing" in text for text in told)
+    width = 4.0 if case.get("element") == "hex8" else 1.0
+    assert force[-1] == pytest.approx(50.0 * 60.0 * width, rel=1e-4)
+    assert up == pytest.approx(-force[-1], rel=1e-8)
+    assert contact.pressure == pytest.approx(50.0, rel=1e-3)
+    assert force[0] == pytest.approx(-drawn, rel=1e-8)
+    assert integral == pytest.approx(force[0], rel=0.03)
+    assert 100.0 * width < force[0] < 140.0 * width
+
+
+@pytest.mark.filterwarnings("ignore:.*coincide with|.*rotat|.*bends")
+@pytest.mark.parametrize("options", FORMULATIONS)
+@pytest.mark.parametrize("case", ["upper", "lower", "turned", "finite", "3d"])
+def test_an_end_loaded_split_grows_as_linear_elastic_fracture_mechanics_predicts(options, case):
+    """Delamination in mode II of a cantilever with deflected arms; both arms are clamped at the other end.
+
+    Williams (1989) adds 0.42 chi h to the crack, with chi = 0.677 for these arms: J. Strain Analysis 24, 207-214.
+    """
+    E, h, a0, L, energy, deflection = 70e3, 3.0, 60.0, 100.0, 0.8, 12.0
+    if case == "3d":
+        arms = [fc.generate.box((L, 2.0, h), (50, 1, 2), "hex8", (0.0, 0.0, z), name="BODY") for z in (0.0, -h)]
+        right = "XMAX"
+    else:
+        arms = [fc.generate.block((L, h), (50, 2), "quad8", (0.0, y), name="BODY") for y in (0.0, -h)]
+        right = "RIGHT"
+    mesh = united(UP_=arms[0], LO_=arms[1])
+    x, across = mesh.points[:, 0], mesh.dim - 1
+    ends = np.flatnonzero((x == 0.0) & (np.abs(mesh.points[:, across]) == h))
+    mesh = mesh.with_groups(points={"ENDS": ends})
+
+    def glued(X):
+        return (np.abs(X[:, across]) < 1e-9) & (X[:, 0] > a0 - 1e-9)
+
+    for body in ("UP", "LO"):
+        mesh = mesh.with_facet_group(f"{body}_GLUE", glued, of=f"{body}_BODY")
+    axes = np.eye(3)
+    if case == "turned":
+        mesh, (c, s) = fc.generate.transformed(mesh, rotate=30.0), (np.cos(np.pi / 6), np.sin(np.pi / 6))
+        axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    strain = "finite" if case == "finite" else "small"
+    model = made_of(
+        mesh,
+        "3d" if case == "3d" else "plane_stress",
+        fc.LinearElastic(E=E, nu=0.0, incompatible_modes=case == "3d"),
+        strain,
+    )
+    model.prescribe("ENDS", axes=axes, **{"xyz"[across]: -deflection})
+    supported(model, **{f"{body}_{right}": "xyz"[: mesh.dim] for body in ("UP", "LO")})
+    sides = ("LO_GLUE", "UP_GLUE") if case == "lower" else ("UP_GLUE", "LO_GLUE")
+    law = {"strength": 15.0, "energy": 0.3, "shear_strength": 20.0, "shear_energy": energy}
+    model.add_contact("glue", secondary=sides[0], primary=sides[1], cohesion=law, **options)
+    before, after = fc.solve(model, [0.2, 0.6])
+    width = 2.0 if case == "3d" else 1.0
+    loads = [-(step.reaction[ends] @ axes[across, : mesh.dim]).sum() / width for step in (before, after)]
+    a = np.linspace(a0, 0.9 * L, 301) + 0.42 * 0.677 * h
+    assert loads[0] == pytest.approx(0.2 * deflection * 2.0 * E * h**3 / (3.0 * a[0] ** 3 + L**3), rel=0.04)
+    growing = np.sqrt(4.0 * energy * E * h**3 / 9.0) / a  # load per width at each length of the crack
+    deflections = growing * (3.0 * a**3 + L**3) / (2.0 * E * h**3)
+    assert deflections[0] < 0.5 * deflection
+    assert loads[1] == pytest.approx(np.interp(0.6 * deflection, deflections, growing), rel=0.02)
+    damage = after.contact["glue"].damage
+    assert 0.1 < (damage > 0.999).mean() < 0.6

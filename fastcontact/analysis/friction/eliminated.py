@@ -115,6 +115,7 @@ class Eliminated:
         usable, mu = constraints.usable, constraints.friction
         rows, free = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
+        self._prescribed = constraints.prescribed
         self._inexact, self._last = inexact, tolerance
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
@@ -143,9 +144,10 @@ class Eliminated:
     def _compliance_of_rows(self, rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
         """Return the sum of `compliance_of_rows` and the tangential compliance of the constraints themselves.
 
-        Tangents with such a compliance are thus not held.
+        Tangents with such a compliance are thus not held. Where supports prescribe gaps, the normal compliance is added.
         """
         compliance = cone_newton.compliance_of_rows(rows, unknown_compliance)
+        compliance[0, 0] += np.where(self._prescribed, self._compliance[0], 0.0)
         slips = np.arange(1, len(rows))
         compliance[slips, slips] += self._compliance[1:]
         return compliance

@@ -151,6 +151,7 @@ def _with_included(
     F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning_rotation(compliance_of_each(F, 3)) if k == 2 else None
     C = compliance_of_each(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
+    C[0, 0] += np.where(constraints.prescribed, constraints.softness, 0.0)[rows]
     held_slips = held_tangents(C)
     held_rows = np.flatnonzero(held_slips) + len(rows)
     _add_compliance(F, constraints, rows)

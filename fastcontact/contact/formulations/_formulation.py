@@ -567,13 +567,15 @@ class Formulation(ABC):
 
         This is the case if supports hold all nodes of a facet, and the other side, in one direction. If supports hold the
         complete side in a direction along the contact, as in a slice in plane strain, the traction in this direction vanishes
-        and is not undetermined.
+        and is not undetermined. The gap determines the pressure of a penalty, and the traction of a cohesive layer.
         """
         held_both = self._held_on_both_sides(config)
-        if not held_both.any():
+        if not held_both.any() or self.options.cohesion is not None:
             return np.zeros(len(held_both), bool)
         along = deflate(held_both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
         across = held_both - along
+        if self.options.penalty is not None:
+            across = np.zeros_like(across)
         if self.options.kind != "tied":
             since_begin = replace(config, start=np.zeros_like(config.displacement))
             along = self._held_without_motion(since_begin) if self.friction else np.zeros_like(held_both)

@@ -146,3 +146,8 @@ def test_the_tangent_without_initial_stress_is_positive_semidefinite(kinematics:
         assert values[0] >= -1e-12 * values[-1]
         assert np.abs(definite.K.toarray() - whole.K.toarray()).max() >= 1e-3 * values[-1] * abs(squeeze)
         assert np.array_equal(definite.force, whole.force)
+
+
+def test_no_hardening_is_perfect_plasticity():
+    materials = [fc.ElasticPlastic(E=100.0, nu=0.3, yield_stress=0.3, **given) for given in ({}, {"hardening": None})]
+    assert materials[0] == materials[1]
