@@ -84,14 +84,16 @@ def result_warnings(
     """
     earlier = {peak[0]: peak for peak in peaks.values() if peak[0] != last.index}
     warnings = interpenetration(problem, last, list(earlier.values()))
-    warnings += [*_loaded_springs(problem, state), *_undetermined_positions(last, free)]
+    warnings += [*_loaded_springs(problem, last), *_undetermined_positions(last, free)]
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
     warnings += locking_warnings(problem, state, last)
     if reason := problem.solver.replacement_reason:
         warnings.append(f'{reason}. linear_solver="direct" factorises the matrix from the start')
     load = problem.load_at(last.load_factor)
-    loaded, sag = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
+    rises = load.rise, state.rise  # prescribed for nonlinear bodies, and conducted
+    loaded = any(values is not None and values.any() for values in (load.force, load.lift, *rises))
+    sag = sag_warnings(problem, state, last)
     clearances = _open_clearances(problem, state)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
@@ -270,11 +272,9 @@ def _loose_criteria(problem: Problem, last: StepResult) -> Iterator[str]:
         )
 
 
-def _loaded_springs(problem: Problem, state: State) -> Iterator[str]:
-    if problem.floating_bodies is None or state.rigid is None:
-        return
-    report = problem.floating_bodies.report(state.rigid, state.largest_rigid_force)
-    if report["relative_to_load"] > problem.criteria.relative:
+def _loaded_springs(problem: Problem, last: StepResult) -> Iterator[str]:
+    report = last.iterations.get("regularised")
+    if report is not None and report["relative_to_load"] > problem.criteria.relative:
         yield (
             f"the springs that regularise {'; '.join(report['motions'])} still carry {report['relative_to_load']:.1e} of "
             "the load: rigid motions are so much larger than deformations that round-off permits no higher accuracy"

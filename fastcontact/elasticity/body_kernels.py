@@ -2,9 +2,10 @@
 """Element loop of nonlinear bodies: tangent stiffness, internal forces, stresses, energies and history.
 
 The formulation is total Lagrangian. Nodal forces are integrals of P . dN/dX over the reference configuration, and the tangent
-consists of integrals of dN/dX . A . dN/dX (Bonet and Wood, 2008, chapter 9). At small strains, P is the Cauchy stress, and J
-is one plus the trace of the strain. With thermal expansion, F is the elastic part of the deformation gradient, relative to
-the stress-free intermediate configuration (Lu and Pister, 1975).
+consists of integrals of dN/dX . A . dN/dX (Bonet and Wood, 2008, chapter 9). At small strains, P is the Cauchy stress, J - 1
+is the trace of the strain, and F denotes the displacement gradient, because the differences F - I and J - 1 would add
+round-off to small strains. With thermal expansion, F is the elastic part of the deformation gradient, relative to the
+stress-free intermediate configuration (Lu and Pister, 1975).
 """
 
 import numpy as np
@@ -60,12 +61,12 @@ def _map(points, displacement, cells, c, columns, x, maps):
 
 
 @kernel
-def _at_point(maps, q, dim, rows, inverse, gradient, F):
+def _at_point(maps, q, dim, rows, finite, inverse, gradient, F):
     """Fill F (3, 3) and the three rows of point q in `gradient` (n_q * 3 + 1, width); return det J.
 
     `maps` is computed by `_map`, and `rows` by `_tables`. `inverse` (3, 4) is overwritten.
     """
-    k = 3 * q
+    k, one = 3 * q, 1.0 if finite else 0.0
     j00, j01, j02, j10, j11, j12 = maps[k, 0], maps[k, 1], maps[k, 2], maps[k + 1, 0], maps[k + 1, 1], maps[k + 1, 2]
     j20, j21, j22 = maps[k + 2, 0], maps[k + 2, 1], 1.0 if dim == 2 else maps[k + 2, 2]
     c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
@@ -79,7 +80,7 @@ def _at_point(maps, q, dim, rows, inverse, gradient, F):
     for i in range(3):
         r, s, t = maps[k, 4 + i], maps[k + 1, 4 + i], maps[k + 2, 4 + i]
         for j in range(3):
-            F[i, j] = r * inverse[0, j] + s * inverse[1, j] + t * inverse[2, j] + (1.0 if i == j else 0.0)
+            F[i, j] = r * inverse[0, j] + s * inverse[1, j] + t * inverse[2, j] + (one if i == j else 0.0)
     return det
 
 
@@ -101,19 +102,17 @@ def _expanded(strain, N, cell, rise, finite, F, gradient):
     """Remove thermal expansion from F and from the shape derivatives `gradient` (3, width), in place.
 
     `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per unit rise, with engineering shear
-    strains. Returns the thermal volume ratio and the thermal stretch along z.
+    strains. Returns the thermal volume ratio and the thermal strain along z.
     """
-    rise_at_point = 0.0
+    rise_at_point, one = 0.0, 1.0 if finite else 0.0
     for a in range(len(cell)):
         rise_at_point += N[a] * rise[cell[a]]
     U, inverse = np.empty((3, 3)), np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            U[i, j] = 1.0 + rise_at_point * strain[i] if i == j else 0.5 * rise_at_point * strain[voigt(i, j)]
+            U[i, j] = one + rise_at_point * strain[i] if i == j else 0.5 * rise_at_point * strain[voigt(i, j)]
     if not finite:
         F -= U
-        for i in range(3):
-            F[i, i] += 1.0
         return 1.0, U[2, 2]
     cofactor(U, inverse)
     ratio = determinant(U)
@@ -124,18 +123,18 @@ def _expanded(strain, N, cell, rise, finite, F, gradient):
             F[i, j] = elastic[i, j]
         for a in range(gradient.shape[1]):
             gradient[i, a] = pulled_back[i, a]
-    return ratio, U[2, 2]
+    return ratio, U[2, 2] - 1.0
 
 
 @kernel
 def _dilatation(F, finite, G):
-    """Return J and fill G (3, 3) with dJ/dF; at small strains, J is one plus the trace of the strain."""
+    """Return J - 1 and fill G (3, 3) with dJ/dF."""
     if finite:
         cofactor(F, G)
-        return determinant(F)
+        return determinant(F) - 1.0
     G[:] = 0.0
     G[0, 0] = G[1, 1] = G[2, 2] = 1.0
-    return F[0, 0] + F[1, 1] + F[2, 2] - 2.0
+    return F[0, 0] + F[1, 1] + F[2, 2]
 
 
 @kernel
@@ -158,60 +157,63 @@ def _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A):
 
 
 @kernel
-def _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new, P, A, G):
+def _respond_in_plane_stress(constants, D, bulk, finite, strain_z, F, old, new, P, A, G):
     """Solve for the value of F_zz at which P_zz vanishes, and eliminate F_zz from A.
 
-    `stretch_z` is the thermal out-of-plane stretch. Returns the energy density, and whether the iteration has converged.
+    `strain_z` is the thermal strain along z. Returns the energy density, and whether the iteration has converged.
     """
     tangent = np.bool_(True)  # for a literal, Numba would compile the laws again
-    F[2, 2] = (1.0 + old[8]) / stretch_z if finite else 2.0 + old[8] - stretch_z
+    F[2, 2] = (1.0 + old[8]) / (1.0 + strain_z) if finite else old[8] - strain_z
     for _ in range(MAX_ITERATIONS):
-        J = _dilatation(F, finite, G)
-        pressure = bulk * (J - 1.0)
+        dilatation = _dilatation(F, finite, G)
+        pressure = bulk * dilatation
         volumetric = (pressure, bulk, pressure if finite else 0.0)
-        energy = respond(constants, D, F, J, G, volumetric, tangent, old, new, P, A)
+        energy = respond(constants, D, F, 1.0 + dilatation, G, volumetric, tangent, old, new, P, A)
         if not A[8, 8] > 0.0:
             return energy, False
         if abs(P[2, 2]) <= TOLERANCE * A[8, 8]:
-            new[8] = F[2, 2] * stretch_z - 1.0 if finite else F[2, 2] + stretch_z - 2.0
+            new[8] = F[2, 2] * (1.0 + strain_z) - 1.0 if finite else F[2, 2] + strain_z
             for row in range(8):
                 for column in range(8):
                     A[row, column] -= A[row, 8] * A[8, column] / A[8, 8]
-            return energy + 0.5 * bulk * (J - 1.0) ** 2, True
-        F[2, 2] = max(F[2, 2] - P[2, 2] / A[8, 8], 0.2 * F[2, 2])
+            return energy + 0.5 * bulk * dilatation**2, True
+        corrected = F[2, 2] - P[2, 2] / A[8, 8]
+        F[2, 2] = max(corrected, 0.2 * F[2, 2]) if finite else corrected
     return 0.0, False
 
 
 @kernel
 def _respond(
-    constants, D, bulk, pressure, stretch_z, plane_stress, finite, geometric, tangent, F, J, G, old, new, P, A
-):
+    constants, D, bulk, pressure, strain_z, plane_stress, finite, geometric, tangent, F, dilatation, G, old, new, P, A
+):  # fmt: skip
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress has converged.
 
-    `pressure` is due to the projected dilatation, `bulk` is the bulk modulus for the remainder, and G (3, 3) is the
-    derivative of J. For the other arguments, see `linearise`, `_respond_in_plane_stress` and `respond`.
+    `pressure` is due to the projected dilatation, `bulk` is the bulk modulus for the remainder, `dilatation` is J - 1, and
+    G (3, 3) is its derivative. For the other arguments, see `linearise`, `_respond_in_plane_stress` and `respond`.
     """
     omitted = finite and geometric == 0 and tangent
     if plane_stress:
-        energy, converged = _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new, P, A, G)
+        energy, converged = _respond_in_plane_stress(constants, D, bulk, finite, strain_z, F, old, new, P, A, G)
         _subtract_initial_stress(omitted, G, determinant(F), P, 0.0, 0.0, A)
         return energy, converged
-    pressure += bulk * (J - 1.0)
+    J = 1.0 + dilatation
+    pressure += bulk * dilatation
     d2J_factor = pressure if finite and geometric == 2 and tangent else min(pressure, 0.0) if omitted else 0.0
     energy = respond(constants, D, F, J, G, (pressure, bulk, d2J_factor), tangent, old, new, P, A)
     _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A)
-    return energy + 0.5 * bulk * (J - 1.0) ** 2, True
+    return energy + 0.5 * bulk * dilatation**2, True
 
 
 @kernel
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
     """Subtract the elastic tangent of small strains, without the projected dilatation, from A (18, 12)."""
-    no_history, new, P, G, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.zeros((18, 12))
-    F, finite, tangent, geometric = np.eye(3), np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
-    J = _dilatation(F, finite, G)
+    no_history, new, P, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.zeros((18, 12))
+    F, G = np.zeros((3, 3)), np.empty((3, 3))
+    finite, tangent, geometric = np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
+    dilatation = _dilatation(F, finite, G)
     _respond(
-        constants, D, bulk, 0.0, 1.0, plane_stress, finite, geometric, tangent, F, J, G, no_history, new, P, elastic
-    )
+        constants, D, bulk, 0.0, 0.0, plane_stress, finite, geometric, tangent, F, dilatation, G, no_history, new, P, elastic
+    )  # fmt: skip
     A -= elastic
 
 
@@ -244,10 +246,10 @@ def _copy(source, first, out, row):
 
 
 @kernel
-def _project(polynomials, volume, gradient, dim, J, G, factors, mass, projected, slopes):
+def _project(polynomials, volume, gradient, dim, dilatation, G, factors, mass, projected, slopes):
     """Project the dilatation of a cell onto polynomials.
 
-    J (n_q,) is one plus the dilatation, and G (3 n_q, 3) its derivatives with respect to F. The results are the coefficients
+    G (3 n_q, 3) contains the derivatives of the `dilatation` (n_q,) with respect to F. The results are the coefficients
     `projected` (m, 1) of the orthonormal polynomials, the Cholesky factor `mass` (m, m) of the mass matrix and, if the array
     is not empty, the derivatives `slopes` (4 m, width) of the coefficients with respect to the displacements, four rows for
     each polynomial.
@@ -259,7 +261,7 @@ def _project(polynomials, volume, gradient, dim, J, G, factors, mass, projected,
             weight = volume[q] * polynomials[q, k]
             for n in range(k + 1):
                 mass[k, n] += weight * polynomials[q, n]
-            projected[k, 0] += weight * (J[q] - 1.0)
+            projected[k, 0] += weight * dilatation[q]
             _weigh(G, 3 * q, weight, dim, factors, 3 * q)
         if len(slopes):
             _integrate(factors, gradient, slopes, 4 * k)
@@ -393,7 +395,7 @@ def linearise(
     x, maps, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
     gradient, volume, forces = np.empty((3 * n_q + 1, width)), np.empty(n_q), np.empty((4, width))
     F, G, Fs, Gs = np.empty((3, 3)), np.empty((3, 3)), np.empty((3 * n_q, 3)), np.empty((3 * n_q, 3))
-    ratio, stretch_z, pressure = np.empty(n_q), np.ones(n_q), np.empty(n_q)
+    dilatation, strain_z, pressure = np.empty(n_q), np.zeros(n_q), np.empty(n_q)
     P, A, in_part = np.empty((3, 3)), np.zeros((18, 12)), np.empty(n_nodes, np.bool_)
     before, after, factors = np.zeros(9), np.empty(9), np.zeros((3 * n_q, 4))
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
@@ -407,22 +409,22 @@ def linearise(
             continue
         _map(points, displacement, cells, c, columns, x, maps)
         for q in range(n_q):
-            volume[q] = weights[q] * _at_point(maps, q, dim, rows, inverse, gradient, F)
+            volume[q] = weights[q] * _at_point(maps, q, dim, rows, finite, inverse, gradient, F)
             if axisymmetric:
                 volume[q] *= _about_axis(x, N, q, gradient, F)
             if len(rise):
                 strain, rows_of_q = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
-                expansion_ratio, stretch_z[q] = _expanded(strain, N[q], cells[c], rise, finite, F, gradient[rows_of_q])
+                expansion_ratio, strain_z[q] = _expanded(strain, N[q], cells[c], rise, finite, F, gradient[rows_of_q])
                 volume[q] *= expansion_ratio
-            ratio[q] = _dilatation(F, finite, G)
-            if finite and not ratio[q] > 0.0:
+            dilatation[q] = _dilatation(F, finite, G)
+            if finite and not dilatation[q] > -1.0:
                 return INVERTED, c
             _copy(F, 0, Fs, 3 * q)
             _copy(G, 0, Gs, 3 * q)
         pressure[:] = 0.0
         stored, dissipated, bulk_mean, n_factors = 0.0, 0.0, bulk[material[c, 0], 0], 0
         if bulk_mean > 0.0:
-            _project(polynomials, volume, gradient, dim, ratio, Gs, factors, mass, projected, slopes)
+            _project(polynomials, volume, gradient, dim, dilatation, Gs, factors, mass, projected, slopes)
             stored += _pressures(bulk_mean, polynomials, mass, projected, pressure)
         for q in range(n_q):
             if material[c, q] != row:
@@ -434,15 +436,15 @@ def linearise(
             _copy(Fs, 3 * q, F, 0)
             _copy(Gs, 3 * q, G, 0)
             if direct:
-                total = pressure[q] + bulk[row, 1] * (ratio[q] - 1.0)
+                J, total = 1.0 + dilatation[q], pressure[q] + bulk[row, 1] * dilatation[q]
                 volumetric = total, bulk[row, 1], total
-                density, factor, d2J_factor, _, _ = first_invariant(law, F, ratio[q], G, volumetric, stiff, P, A)
+                density, factor, d2J_factor, _, _ = first_invariant(law, F, J, G, volumetric, stiff, P, A)
                 sum_products(2, factor, d2J_factor, stiff, F, A)
-                density += 0.5 * bulk[row, 1] * (ratio[q] - 1.0) ** 2
+                density += 0.5 * bulk[row, 1] * dilatation[q] ** 2
             else:
                 density, converged = _respond(
-                    law, D, bulk[row, 1], pressure[q], stretch_z[q], plane_stress, finite, geometric, stiff, F, ratio[q], G,
-                    before, after, P, A,
+                    law, D, bulk[row, 1], pressure[q], strain_z[q], plane_stress, finite, geometric, stiff, F,
+                    dilatation[q], G, before, after, P, A,
                 )  # fmt: skip
                 if not converged:
                     return NO_PLANE_STRESS, c

@@ -3,7 +3,7 @@
 
 Shared arguments: ``F`` (3, 3) is the deformation gradient [-] and ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure].
 The first nine rows and columns of ``A`` (18, 12) contain its derivative dP/dF, in which component iJ has the index 3 i + J;
-the other entries are work space. Laws for small strains use the symmetric part of F - I; their P is the Cauchy stress.
+the other entries are work space. For laws at small strains, F is the displacement gradient and P the Cauchy stress.
 `constants` (n_constants,) begin with the number of the law, see `nonlinear_materials`. `old` and `new` (9,) are the history
 variables at the beginning and the end of the load step: the plastic strain (xx, yy, zz, xy, yz, xz, tensor
 components), the equivalent plastic strain, the plastic work [energy / volume], and in plane stress F_zz - 1. At finite
@@ -113,8 +113,6 @@ def _hooke(D, strain, stress):
 def _linear(D, F, tangent, P, A):
     """Apply Hooke's law for small strains with moduli D (6, 6); return the energy density."""
     strain = 0.5 * (F + F.T)
-    for i in range(3):
-        strain[i, i] -= 1.0
     for row in range(9 if tangent else 0):
         for column in range(9):
             A[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]

@@ -317,6 +317,21 @@ def test_a_body_that_nothing_loads_has_no_determined_position(friction):
         assert not free or "body 'UPPER': translation along y" in texts[0]
 
 
+@pytest.mark.filterwarnings("ignore:contact 'drum'")
+def test_springs_of_a_body_loaded_only_across_its_free_motion():
+    """A band over a drum is pulled down at one end and held at the other. Its loads along x, which is free, are round-off."""
+    strip, radius = fc.generate.block((1.0, 1.0), (20, 1), "quad8", name="BAND"), 50.0
+    angle, r = np.pi * (1.0 - strip.points[:, 0]), radius + 0.5 * strip.points[:, 1]
+    points = np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
+    model = elastic_model(strip.replace(points=points), "plane_strain", E=2e6, nu=NU)
+    model.add_traction("LEFT", x=1e-16, y=-20.0)
+    supported(model, RIGHT="y")
+    model.add_obstacle("drum", secondary="BOTTOM", obstacle=fc.obstacles.Sphere((0.0, 0.0), radius), friction=0.3)
+    last = fc.solve(model)[-1]
+    assert last.iterations["regularised"]["relative_to_load"] <= 1e-9
+    assert last.contact["drum"].force[1] > 10.0
+
+
 def test_an_undetermined_position_in_an_earlier_step_is_told_at_the_end():
     """The block is free in the first step, and pushed in the second one."""
     ramp = fc.Ramp((1.0, 2.0), ((0.0, 0.0), (1.0, 0.0), (2.0, 1.0)))

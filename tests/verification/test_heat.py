@@ -18,6 +18,22 @@ BARS = {"size_lower": (0.05, 0.1), "size_upper": (0.05, 0.1), "divisions_lower":
 REST = "ignore:contact 'c' never closed"
 
 
+@pytest.mark.parametrize("yields", [False, True])
+def test_a_hub_loosened_by_conducted_heat_is_told(yields):
+    model = fc.Model(fc.generate.rings(), kinematics="plane_stress", reference_temperature=0.0)
+    law = fc.ElasticPlastic if yields else fc.LinearElastic
+    options = {"yield_stress": 1e4} if yields else {}
+    for group, E, expansion in (("INNER", 210e3, 12e-6), ("OUTER", 70e3, 23e-6)):
+        model.add_material(law(E=E, nu=0.3, expansion=expansion, conductivity=50.0, **options), group)
+    supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
+    model.fix_temperature("BORE", 20.0)
+    model.fix_temperature("RIM", 80.0)
+    model.add_contact("fit", secondary="CONT_OUTER", primary="CONT_INNER", clearance=-0.05, conductance=1.0)
+    with pytest.warns(fc.FastcontactWarning, match="'fit' has opened again at the end: the smallest gap"):
+        steps = fc.solve(model, fc.linear_ramp(2))
+    assert [step.contact["fit"].active.any() for step in steps] == [True, False]
+
+
 def two_bars(kinematics, element, **contact):
     """Two bars of conductivities 50 and 20, 100 at one end and 0 at the other, whose meshes do not match."""
     if kinematics == "3d":

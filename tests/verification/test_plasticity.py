@@ -165,6 +165,20 @@ def test_unloading_is_elastic_and_leaves_a_dent() -> None:
     assert steps[-1].work["plastic_work"] == pytest.approx(steps[1].work["plastic_work"], rel=0.02)
 
 
+@pytest.mark.filterwarnings("ignore:contact 'flat' has only")
+@pytest.mark.parametrize("law", [fc.LinearElastic, lambda **moduli: fc.ElasticPlastic(yield_stress=1e5, **moduli)])
+def test_contact_almost_unloaded(law):
+    """Just before separation, the force of the last node is a fraction of the largest forces."""
+    mesh = fc.generate.quarter_disc("tri6", R=1.0, size=0.1, contact_size=0.0008, contact_radius=0.012)
+    model = made_of(mesh, "axisymmetric", law(E=200e3, nu=0.3))
+    supported(model, A1B1="xy", A1A2="x")
+    flat = fc.obstacles.HalfSpace(point=(0.0, mesh.points[mesh.points_of("CONT1"), 1].max()), normal=(0.0, -1.0))
+    ramp = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]
+    model.add_obstacle("flat", secondary="CONT1", obstacle=flat, motion={"y": -1.9e-5}, ramp=ramp)
+    forces = [step.contact["flat"].force[1] for step in fc.solve(model, [1.0, 1.99414, 2.0])]
+    assert forces == pytest.approx([-0.0243321216648, -1.24927099914e-05, 0.0], rel=1e-9, abs=0.0)
+
+
 def flattened(instants: list[float], size: float):
     """Press a ball on a rigid flat; return forces over that at yield at multiples of the interference at yield."""
     R, modulus, ratio, limit = 1.0, 1000.0, 0.3, 1.0

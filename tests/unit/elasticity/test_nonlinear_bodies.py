@@ -67,6 +67,15 @@ def test_tangent_and_forces_are_derivatives(kinematics: str, element: str, law: 
         assert max((here.history[name][..., 6] - values[..., 6]).max() for name, values in before.items()) > 1e-3
 
 
+@pytest.mark.parametrize("law", [name for name, (_, strain) in LAWS.items() if strain == "small"])
+@pytest.mark.parametrize(("kinematics", "element"), CELLS)
+def test_tiny_forces_have_as_many_digits(kinematics: str, element: str, law: str) -> None:
+    model, bodies = single(element, kinematics, *LAWS[law])
+    u = 1e-5 * np.random.default_rng(1).normal(size=model.mesh.points.shape)
+    large, tiny = (bodies.at(scale * u, bodies.beginning).force for scale in (1.0, 1e-6))
+    assert np.abs(1e6 * tiny - large).max() <= 1e-12 * np.abs(large).max()
+
+
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("element", ["tri3", "quad4", "quad8", "tet4", "hex8", "hex20", "hex27", "wedge6", "pyramid5"])
 def test_the_tangent_begins_as_linear_stiffness(element: str, law: str) -> None:
