@@ -102,7 +102,9 @@ def result_warnings(
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
         undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
-        unresolved = [sag[name]] if name in sag else _coarse_contact(pair, contact, state)
+        unresolved = list(_coarse_contact(pair, contact, state))
+        if name in sag and not (unresolved and isinstance(pair.primary, RigidSide)):  # refinement also reduces the sag
+            unresolved = [sag[name]]
         pressures = [*unresolved, *pressure_oscillation(pair, contact, problem.model)]
         index, _, contacts = peaks[name]
         if not pressures and index != last.index:
