@@ -182,6 +182,12 @@ def _tangential_results(
     if len(sticking) != len(pressure):  # a node sticks if most of its pressure is due to sticking constraints
         assert constraints.nodal is not None
         sticking = constraints.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
+    elif not constraints.usable.all():
+        # A mid-side node without a multiplier sticks if all corners whose forces contribute to its pressure stick.
+        assert constraints.nodal is not None
+        forces = np.abs(multiplier)
+        total, sliding = map(constraints.nodal.pressure, (forces, np.where(sticking, 0.0, forces)))
+        sticking = np.where(constraints.usable, sticking, (total > 0.0) & (sliding <= SUM_ROUND_OFF * total))
     return shear * scale[:, None], sticking, tangential
 
 

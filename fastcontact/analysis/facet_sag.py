@@ -22,7 +22,7 @@ from fastcontact.contact.integration import fine_rule, gauss_rule
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.projection import nodal_normals
-from fastcontact.contact.surface import FacetBlock
+from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.results.step import ContactResult, StepResult
@@ -30,8 +30,9 @@ from fastcontact.round_off import TINY
 
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
 # pressures were 0.2 to 3.2 times the estimate on linear facets, except where contact opens due to the error, and up to 3
-# times on quadratic ones; against rigid shapes, where the value for linear facets applies to all, 1.1 to 1.3.
+# times on quadratic ones. Against rigid shapes the ratio is 0.9 to 1.3, and the limit is smaller.
 RELATIVE_ERROR_LIMIT = {1: 0.2, 2: 0.1}
+RELATIVE_ERROR_LIMIT_AT_RIGID_SHAPES = 0.05
 # Ratio of the estimate to E d / L if the gaps are weighted means: the inverse mass matrix amplifies gaps that alternate from
 # node to node.
 MEAN_GAP_FACTOR = 2.0
@@ -56,11 +57,11 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
 def _warning(pair: Formulation, spread: float, slope: float, contact: ContactResult) -> str:
     """Return a warning about the pressure error due to the sag, see `_sag`; an empty string if it is small."""
     side, order = pair.secondary, pair.secondary.order
-    length = facet_length(pair)
+    length = facet_length(pair.secondary, pair.points)
     limit, power = RELATIVE_ERROR_LIMIT[order], 2 * order - 1
     remedy = "surface_smoothing=True measures the gap between the arcs"
     if isinstance(pair.primary, RigidSide):
-        limit, power = RELATIVE_ERROR_LIMIT[1], 2 * order
+        limit, power = RELATIVE_ERROR_LIMIT_AT_RIGID_SHAPES, 2 * order
         remedy = "formulation 'node_to_segment' measures the gap at nodes, which lie on the arc"
     mean = float(contact.pressure[contact.pressure > 0.0].mean())
     error = pair.modulus * slope
@@ -97,14 +98,14 @@ def _inclination(pair: Formulation, configuration: Configuration, contact: Conta
     )
 
 
-def _lengths(pair: Formulation, block: FacetBlock) -> Array:
+def _lengths(block: FacetBlock, points: Array) -> Array:
     """Return the lengths (n_facets,) of the facets of a block [length]."""
-    return np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+    return np.linalg.norm(np.ptp(points[block.facets], axis=1), axis=1)
 
 
-def facet_length(pair: Formulation) -> float:
-    """Return the median length of the facets of the secondary side [length]."""
-    return float(np.median(np.concatenate([_lengths(pair, block) for block in pair.secondary.blocks])))
+def facet_length(side: Surface, points: Array) -> float:
+    """Return the median length of the facets of a side, for coordinates `points` (n_points, dim) [length]."""
+    return float(np.median(np.concatenate([_lengths(block, points) for block in side.blocks])))
 
 
 def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple[float, float]:
@@ -113,7 +114,7 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     points = Candidates.inside(pair.secondary, [xi for xi, _ in rules])
     deformed, closed = pair.points + configuration.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True
-    extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), facet_length(pair))
+    extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), facet_length(pair.secondary, pair.points))
     if isinstance(pair.primary, RigidSide):
         rows = np.flatnonzero(closed[points.nodes].all(axis=1))
         nodes, pose = points.nodes[rows], configuration.pose
@@ -135,9 +136,11 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     sag_in_contact = sag[rows[in_contact]]
     spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
     if pair.secondary.order == 2:
-        return spread, spread / facet_length(pair)
+        return spread, spread / facet_length(pair.secondary, pair.points)
     blocks = zip(pair.secondary.blocks, rules, strict=True)
-    weights = [np.repeat(_lengths(pair, block), len(w)) * np.tile(w, len(block.facets)) for block, (_, w) in blocks]
+    weights = [
+        np.repeat(_lengths(block, pair.points), len(w)) * np.tile(w, len(block.facets)) for block, (_, w) in blocks
+    ]
     return spread, max(offset, _slope(pair, points, np.concatenate(weights), sag, closed))
 
 
@@ -154,7 +157,7 @@ def _slope(pair: Formulation, points: Candidates, weights: Array, sag: Array, cl
     sums = np.bincount(nodes, (portions * np.nan_to_num(sag)[:, None]).ravel(), n)
     mean = np.divide(sums, total, out=np.full(n, np.nan), where=total > 0.0)
     for block in pair.secondary.blocks:
-        slopes = np.ptp(mean[block.facets], axis=1) / _lengths(pair, block)
+        slopes = np.ptp(mean[block.facets], axis=1) / _lengths(block, pair.points)
         largest = max(largest, float(np.nan_to_num(slopes[closed[block.facets].any(axis=1)]).max(initial=0.0)))
     return largest * (1.0 if pair.name == "node_to_segment" else MEAN_GAP_FACTOR)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -43,6 +43,43 @@ def test_no_friction_and_a_zero_coefficient_are_the_same(formulation):
     one = pressed_block(formulation, 0.0, 1e-4)[-1]
     other = pressed_block(formulation, 1e-12, 1e-4)[-1]
     assert np.abs(one.stress - other.stress).max() < 1e-9 * np.abs(one.stress).max()
+
+
+def pressed_cube(element, friction, push):
+    """Return the contact of a body on one with other facets, its multipliers linear between corners, pushed sideways."""
+    linear = {"hex20": "hex20", "tet10": "tet4"}[element]
+    lower = fc.generate.box((4.0, 4.0, 2.0), (4, 4, 2), linear, name="LOWER")
+    upper = fc.generate.box((4.0, 4.0, 2.0), (3, 3, 2), linear, (0.0, 0.0, 2.0), name="UPPER")
+    if element == "tet10":
+        lower, upper = map(fc.generate.to_quadratic, (lower, upper))
+    mesh = united(LOWER_=lower, UPPER_=upper)
+    model = elastic_model(mesh, LOWER_ZMIN="xyz", UPPER_ZMAX={"x": push, "y": 0.0, "z": -0.01})
+    model.add_contact("pair", secondary="UPPER_ZMIN", primary="LOWER_ZMAX", friction=friction, multipliers="standard")
+    return fc.solve(model, 1)[-1].contact["pair"]
+
+
+@pytest.mark.parametrize("element", ["hex20", "tet10"])
+def test_mid_side_nodes_without_multipliers_stick_like_the_corners(element):
+    contact = pressed_cube(element, 3.0, 0.0)
+    assert contact.active.all()
+    assert contact.sticking.all()
+    assert not contact.slip.any()
+
+
+@pytest.mark.parametrize("push", [0.008, 0.1])
+def test_mid_side_nodes_slide_between_corners_of_which_one_slides(push):
+    contact = pressed_cube("hex20", 0.3, push)
+    grid = np.round(contact.coordinates[:, :2] * 1.5, 6)  # corners have even numbers
+    middle = (grid % 2 == 1).any(axis=1)
+    sticks = {tuple(place): stick for place, stick in zip(grid, contact.sticking, strict=True)}
+    assert contact.active.all()
+    assert middle.sum() == 24
+    for place, stick in zip(grid[middle], contact.sticking[middle], strict=True):
+        half = place % 2
+        assert stick == (sticks[tuple(place - half)] and sticks[tuple(place + half)])
+    assert 0 < contact.sticking[middle].sum() < 24 if push < 0.01 else not contact.sticking.any()
+    assert (np.linalg.norm(contact.slip, axis=1) > 0.0)[~contact.sticking].all()
+    assert not contact.slip[contact.sticking].any()
 
 
 def squeezed(element, nu, mu, **options):

@@ -134,6 +134,44 @@ def test_quadratic_facets_with_accurate_pressures_are_not_told(element, inner, o
     assert np.abs(contact.pressure / LAME - 1).max() < 0.1
 
 
+def heated(element, divisions_outer, **options):
+    """Return the pressures of an aluminium ring shrunk on steel that heat has almost released, and the remedies for them."""
+    mesh = fc.generate.rings(
+        element,
+        inner_radius=20.0,
+        interface_radius=28.0,
+        outer_radius=40.0,
+        divisions_inner=(4, 12),
+        divisions_outer=divisions_outer,
+    )
+    materials = {
+        "INNER": fc.LinearElastic(210_000.0, 0.3, expansion=12e-6),
+        "OUTER": fc.LinearElastic(70_000.0, 0.33, expansion=23e-6),
+    }
+    model = made_of(mesh, "plane_stress", materials, SYMMETRY_X="x", SYMMETRY_Y="y")
+    model.add_contact("fit", secondary="CONT_OUTER", primary="CONT_INNER", clearance=-0.02, **options)
+    model.add_temperature(60.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        last = fc.solve(model, 1)[-1]
+    return last.contact["fit"].pressure, [text.split(", or ")[-1] for text in last.warnings if "oscillate" in text]
+
+
+@pytest.mark.parametrize("count", [14, 24])
+def test_standard_multipliers_are_the_remedy_where_facets_are_smaller_than_the_opposite_ones(count):
+    pressure, remedies = heated("quad8", (5, count))
+    assert np.ptp(pressure) > 0.2 * pressure.mean()
+    assert remedies == ['use multipliers="standard" if the contact has no sharp edges']
+    pressure, remedies = heated("quad8", (5, count), multipliers="standard")
+    assert np.ptp(pressure) < 0.01 * pressure.mean()
+    assert not remedies
+
+
+def test_smaller_facets_of_both_sides_are_the_remedy_on_linear_facets_smaller_than_the_opposite_ones():
+    _, remedies = heated("quad4", (5, 24))
+    assert remedies == ["use smaller facets of both 'CONT_OUTER' and 'CONT_INNER'"]
+
+
 @pytest.mark.parametrize(("depth", "oscillates"), [(0.0, False), (1e-3, True)])
 def test_pressures_oscillate_where_every_second_node_is_open(depth, oscillates):
     """Grooves at the nodes between corners, as wear may leave them."""

@@ -171,15 +171,26 @@ def test_facets_of_nearly_equal_lengths_under_a_small_pressure_error_are_not_tol
     assert not texts
 
 
-@pytest.mark.parametrize(("n", "told"), [(12, True), (48, False)])
-def test_chords_against_exact_shapes_are_told(n, told):
-    model = fit(divisions=(n, n), kind="tied", clearance=None)
-    model.add_obstacle(
-        "rod", secondary="BORE", obstacle=fc.obstacles.Sphere(centre=(0.0, 0.0), R=20.05), formulation="continuous"
-    )
-    texts = warned(model)[1]
-    assert bool(texts) == told
-    assert all("formulation 'node_to_segment'" in text for text in texts)
+@pytest.mark.parametrize("formulation", ["continuous", "mortar"])
+@pytest.mark.parametrize(("n", "told"), [(12, True), (24, True), (36, True), (48, False)])
+def test_errors_of_chords_against_exact_shapes_are_told_from_one_twentieth_on(n, told, formulation):
+    """The estimate is within 30 %, here of the difference from contact at the nodes, which lie on the circle."""
+    contacts = []
+    for kind in (formulation, "node_to_segment"):
+        model = fit(divisions=(n, n), kind="tied", clearance=None)
+        rod = fc.obstacles.Sphere(centre=(0.0, 0.0), R=20.05)
+        model.add_obstacle("rod", secondary="BORE", obstacle=rod, formulation=kind)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            contacts.append(fc.solve(model, 1)[-1])
+    texts = [[text for text in step.warnings if "deviate from their arcs" in text] for step in contacts]
+    pressure, exact = (step.contact["rod"].pressure.mean() for step in contacts)
+    assert len(texts[0]) == told == (pressure > 1.05 * exact)
+    assert not texts[1]
+    for text in texts[0]:
+        assert "formulation 'node_to_segment'" in text
+        estimate = float(re.search(r"pressures by about ([\d.]+),", text)[1])
+        assert 1.0 / 1.3 < estimate / (pressure - exact) < 1.3
 
 
 def test_steps_with_and_without_smoothing_are_of_different_cases():
