@@ -266,10 +266,10 @@ def test_contacts_smaller_than_a_facet_have_inaccurate_forces():
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 
 
-def two_blocks(wide=2.0):
+def two_blocks(wide=2.0, **held):
     """A small block on a wide one, whose sides have the prefixes U_ and L_."""
     mesh = united(L_=block((wide, 0.5), (7, 2), origin=(0.0, -0.5)), U_=block((1.0, 0.5), (4, 2)))
-    return elastic_model(mesh, "plane_strain", L_BOTTOM="xy")
+    return elastic_model(mesh, "plane_strain", L_BOTTOM="xy", **held)
 
 
 @pytest.mark.filterwarnings("ignore:the largest", "ignore:.*across its radius")
@@ -297,8 +297,7 @@ def test_with_a_kept_pairing_gaps_are_those_of_that_pairing(formulation):
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_closed_once_is_remembered_beside_the_other_side(formulation):
     """A block slides off the end of the other one while it is closed for good, comes back, and is pulled: it holds."""
-    model = two_blocks(wide=1.5)
-    model.prescribe("U_TOP", x=1.2, ramp=((0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (3.0, 0.0), (4.0, 0.0)))
+    model = two_blocks(wide=1.5, U_TOP={"x": 1.2, "ramp": ((0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (3.0, 0.0), (4.0, 0.0))})
     model.prescribe("U_TOP", y=-0.01, ramp=((0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (3.0, 1.0), (4.0, -1.0)))
     options = {"projection_tolerance": 0.0} if formulation != "mortar" else {}
     model.add_contact(
