@@ -105,8 +105,7 @@ def test_cylinder_wall_has_the_logarithmic_profile():
 
 def test_wall_between_films_with_a_flux_and_a_source():
     mesh = fc.generate.block((1.0, 0.5), (4, 2), "quad8")
-    model = fc.Model(mesh, "plane_strain", reference_temperature=20.0)
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0))
+    model = made_of(mesh, "plane_strain", fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0), reference_temperature=20.0)
     model.fix("LEFT", "xy")
     model.add_film("LEFT", 10.0, 80.0)
     model.add_heat_flux("RIGHT", 30.0)
@@ -243,9 +242,7 @@ def test_tables_are_their_functions_and_steps_begin_where_others_ended():
 
 def test_heat_of_friction_leaves_through_films():
     mesh = fc.generate.block_on_block("quad4", size_lower=(20.0, 5.0), shift=2.0)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0, conductivity=3.0))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = made_of(mesh, "plane_strain", fc.LinearElastic(E=1000.0, nu=0.0, conductivity=3.0), LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", y=-0.05, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (4.0, 1.0)])
     model.prescribe("UPPER_TOP", x=1.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (4.0, 2.0)])
     model.add_contact(
