@@ -1,7 +1,6 @@
 """Floating bodies: springs whose anchors follow the bodies, and the cost of a step."""
 
 import dataclasses
-import warnings
 
 import numpy as np
 import pytest
@@ -291,19 +290,19 @@ def test_a_crate_on_a_driven_one_settles_while_both_slide_on_the_floor():
 
 
 @pytest.mark.parametrize(("divisions", "friction"), [((30, 5), None), ((60, 6), 0.1)])
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")  # of the coarse mesh
 def test_a_beam_moves_with_the_roller_that_loads_it_until_the_other_roller_holds_it(divisions, friction):
     """When a node of the beam reaches the lower roller, the largest elongation grows, but the norm of both decreases."""
     model = elastic_model(fc.generate.block((60.0, 10.0), divisions, "quad8"), "plane_stress", E=2e5, LEFT="x")
     low, up = fc.obstacles.Sphere((50.0, -4.0), 4.0), fc.obstacles.Sphere((20.0, 16.0), 6.0)
     model.add_obstacle("low", secondary="BOTTOM", obstacle=low, friction=friction)
     model.add_obstacle("up", secondary="TOP", obstacle=up, friction=friction, force={"y": -100.0})
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fc.FastcontactWarning)  # of the coarse mesh
-        contact = fc.solve(model, 1)[-1].contact
+    contact = fc.solve(model, 1)[-1].contact
     np.testing.assert_allclose([contact[name].force[1] for name in ("low", "up")], [100.0, -100.0], rtol=1e-6)
 
 
 @pytest.mark.parametrize(("angle", "stiffness"), first_of(2, [(-12.0, 5e3), (-3.0, 5e5), (12.0, 5e3), (-12.0, 5e5)]))
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 def test_a_crate_slides_on_a_driven_incline_until_a_spring_holds_it(angle, stiffness):
     """Base driven along an incline of `angle` (positive: downwards); the spring acts along x, and only contact along y."""
     base = fc.generate.block((0.6, 0.08), (24, 3), "quad4", (-0.3, -0.08))
@@ -319,26 +318,24 @@ def test_a_crate_slides_on_a_driven_incline_until_a_spring_holds_it(angle, stiff
     model.add_spring("B_TOP", x=stiffness / len(top))
     model.prescribe("A_BOTTOM", x=0.05 * np.cos(slope), y=-0.05 * np.sin(slope), ramp=[(0, 0), (1, 0), (2, 1)])
     model.add_contact("AB", secondary="B_BOTTOM", primary="A_TOP", friction=0.4)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fc.FastcontactWarning)
-        step = fc.solve(model, [1.0, 2.0])[-1]
+    step = fc.solve(model, [1.0, 2.0])[-1]
     force = stiffness * step.displacement[top, 0].mean()
     weight = 600.0 * 9.81 * 0.2 * 0.12  # a pressure of 1e-5 times Young's modulus, which turns the normals
     np.testing.assert_allclose(force, weight * np.tan(slope + np.arctan(0.4)), rtol=1e-5)
 
 
 @pytest.mark.parametrize("penalty", [100.0, 0.01])
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")  # of the penetration
 def test_a_soft_penalty_holds_a_stiff_block(penalty):
     model = elastic_model(fc.generate.block((2.0, 1.0), (6, 3), "quad4"), "plane_strain", E=2e5, LEFT="x")
     model.add_pressure("TOP", 1e-3)
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, penalty=penalty)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fc.FastcontactWarning)  # of the penetration
-        step = fc.solve(model, 1)[-1]
+    step = fc.solve(model, 1)[-1]
     np.testing.assert_allclose(-step.displacement[:, 1], 1e-3 / penalty, rtol=1e-6, atol=1e-8)
 
 
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 def test_a_nearly_incompressible_ring_that_friction_holds_by_few_sliding_points_settles():
     """Three walls of a groove: points that slide by round-off must not replace Newton's method."""
     mesh = fc.generate.block((4.0, 4.0), (8, 8), "quad8", (20.0, 0.0))
@@ -350,8 +347,6 @@ def test_a_nearly_incompressible_ring_that_friction_holds_by_few_sliding_points_
         wall = fc.obstacles.HalfSpace(point=point, normal=normal)
         model.add_obstacle(side.lower(), secondary=side, obstacle=wall, friction=0.3, ramp=ramp, **motion)
     model.add_pressure("RIGHT", 0.2, ramp=[(0, 0), (1, 0), (2, 1)])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fc.FastcontactWarning)
-        contact = fc.solve(model, [0.25 * k for k in range(1, 9)])[-1].contact
+    contact = fc.solve(model, [0.25 * k for k in range(1, 9)])[-1].contact
     total = sum(pair.force[1] for pair in contact.values())
     assert abs(total) < 1e-6 * contact["top"].normal_force
