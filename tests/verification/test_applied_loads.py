@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -406,15 +406,9 @@ def test_friction_and_weight_hold_a_block(formulation):
 
 def boxes(lower, upper):
     """Two boxes of other meshes, one on the other."""
-    made = [
-        fc.generate.box((2.0, 2.0, 1.0), (3, 3, 2), lower, name="LOWER"),
-        fc.generate.box((2.0, 2.0, 1.0), (2, 2, 2), upper, (0.0, 0.0, 1.0), name="UPPER"),
-    ]
-    named = [
-        fc.generate.transform.renamed(mesh, lambda name, body=body: name if name == body else f"{body}_{name}")
-        for mesh, body in zip(made, ("LOWER", "UPPER"), strict=True)
-    ]
-    return fc.generate.transform.union(*named)
+    low = fc.generate.box((2.0, 2.0, 1.0), (3, 3, 2), lower, name="LOWER")
+    high = fc.generate.box((2.0, 2.0, 1.0), (2, 2, 2), upper, (0.0, 0.0, 1.0), name="UPPER")
+    return united(LOWER_=low, UPPER_=high)
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])

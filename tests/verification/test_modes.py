@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model, made_of, supported, united
 from refusals import refused
 from scipy.sparse import csr_array
 
@@ -326,11 +326,10 @@ def test_a_stack_of_plates_under_pressure_vibrates_as_each_plate_between_pressur
 @pytest.mark.parametrize("swapped", [False, True])
 def test_rods_pressed_end_to_end_between_pins_slide_past_each_other(options, swapped):
     """Turning both by t lengthens the distance L of the pins to L / cos(t): ``w^2 = P L / inertia``, and no buckling."""
-    rods = []
-    for name, x, n in (("ONE", 0.0, 4), ("TWO", 0.5, 3)):
-        rod = block((0.5, 0.1), (10, n), "quad8", (x, -0.05), name=name)
-        rods.append(fc.generate.renamed(rod, lambda own, name=name: own if own == name else f"{name} {own}"))
-    mesh = union(*rods)
+    one, two = (
+        block((0.5, 0.1), (10, n), "quad8", (x, -0.05), name=name) for name, x, n in (("ONE", 0.0, 4), ("TWO", 0.5, 3))
+    )
+    mesh = united(**{"ONE ": one, "TWO ": two})
     pins = {
         name: [int(np.linalg.norm(mesh.points - [x, 0.0], axis=1).argmin())] for name, x in (("A", 0.0), ("B", 1.0))
     }
@@ -437,11 +436,8 @@ def test_sides_that_repeat_each_other_at_a_corner_hold_once():
     """A block tied to both walls of a corner, whose node is in both pairs."""
     walls = [block((1.0, 1.0), (3, 3), origin=o, name=n) for n, o in (("FLOOR", (1.0, -1.0)), ("WALL", (0.0, 0.0)))]
     parts = [*walls, block((1.0, 1.0), (3, 3), origin=(1.0, 0.0), name="BODY")]
-    named = [
-        fc.generate.renamed(part, lambda own, name=name: own if own == name else f"{name} {own}")
-        for part, name in zip(parts, ("FLOOR", "WALL", "BODY"))
-    ]
-    model = model_of(union(*named), "plane_strain", FLOOR="xy", WALL="xy")
+    mesh = united(**dict(zip(("FLOOR ", "WALL ", "BODY "), parts)))
+    model = model_of(mesh, "plane_strain", FLOOR="xy", WALL="xy")
     found = model.add_contacts(kind="tied")
     assert len(found) >= 2
     alone = model_of(parts[2], "plane_strain", BOTTOM="xy", LEFT="xy")

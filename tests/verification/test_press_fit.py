@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model, made_of, supported, united
 from two_bodies import rings
 
 import fastcontact as fc
@@ -88,11 +88,7 @@ def tubes(element, n, along):
     """Shaft and hub as tubes of unit length; `along` divisions of the shaft, three of the hub."""
     shaft = fc.generate.block((1.0, 1.0), (n, along), element, (1.0, 0.0), name="SHAFT")
     hub = fc.generate.block((1.0, 1.0), (n, 3), element, (2.0, 0.0), name="HUB")
-    named = [
-        fc.generate.renamed(m, {g: f"{p}_{g}" for g in ("LEFT", "RIGHT", "TOP", "BOTTOM")})
-        for m, p in ((shaft, "SHAFT"), (hub, "HUB"))
-    ]  # fmt: skip
-    model = made_of(fc.generate.union(*named), "axisymmetric", {"SHAFT": SHAFT, "HUB": HUB})
+    model = made_of(united(SHAFT_=shaft, HUB_=hub), "axisymmetric", {"SHAFT": SHAFT, "HUB": HUB})
     for part in ("SHAFT", "HUB"):
         supported(model, **{f"{part}_TOP": "y", f"{part}_BOTTOM": "y"})
     return model

@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of
+from models import elastic_model, made_of, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -162,8 +162,7 @@ def test_the_remedy_for_oscillating_pressures_suits_the_cells_there(element, cou
     """The head of a bolt, pulled by its shank, on a plate of quadrangles with facets of length 1."""
     head = fc.generate.block((16.0, 6.0), (count, 3), element, (-8.0, 0.0), name="HEAD")
     plate = fc.generate.block((40.0, 10.0), (40, 10), "quad8", (-20.0, -10.0), name="PLATE")
-    head = fc.generate.renamed(head, {group: f"H_{group}" for group in head.group_names})
-    mesh = fc.generate.union(head, fc.generate.renamed(plate, {group: f"P_{group}" for group in plate.group_names}))
+    mesh = united(H_=head, P_=plate)
     for group, sign in (("SEAT", 1.0), ("SHANK", -1.0)):
         mesh = mesh.with_facet_group(
             group, lambda x, sign=sign: (x[:, 1] == 0.0) & (sign * (abs(x[:, 0]) - 4.0) > -1e-9), of="H_HEAD"

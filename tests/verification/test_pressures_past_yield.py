@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import supported
+from models import supported, united
 
 import fastcontact as fc
 
@@ -80,11 +80,7 @@ def dome_on_block(divisions: int, exchanged: bool, **options) -> fc.Model:
     x, y, z = dome.points.T
     rise = 0.3 * ((x - 1.0) ** 2 + (y - 1.0) ** 2) * (1.6 - z) / 0.6
     dome = dome.replace(points=np.column_stack([x, y, z + rise]))
-    block, dome = (
-        fc.generate.renamed(mesh, {side: f"{name}_{side}" for side in ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX")})
-        for mesh, name in ((block, "A"), (dome, "B"))
-    )
-    model = fc.Model(fc.generate.union(block, dome), "3d", strain="finite")
+    model = fc.Model(united(A_=block, B_=dome), "3d", strain="finite")
     model.add_material(fc.ElasticPlastic(200e3, 0.3, yield_stress=300.0, hardening=[(0.0, 300.0), (0.1, 400.0)]))
     supported(model, A_ZMIN="xyz", B_ZMAX="xy")
     model.prescribe("B_ZMAX", z=-0.05)

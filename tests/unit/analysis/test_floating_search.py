@@ -229,13 +229,12 @@ WIDTHS = np.array([120.0, 100.0, 80.0, 60.0])
 def stack(dim, weakest, angle, options):
     """Boxes A to D under gravity, A driven sideways and back, D held, and the matrix that turns all; see `WIDTHS`."""
     make, rest, element = (fc.generate.block, (20.0,), "quad4") if dim == 2 else (fc.generate.box, (40.0, 20.0), "hex8")
-    boxes, turn = [], np.eye(dim)
+    boxes, turn = {}, np.eye(dim)
     for i, (body, width) in enumerate(zip("ABCD", WIDTHS, strict=True)):
         corner = (-width / 2, *(0.0,) * (dim - 2), 20.0 * i)
-        box = make((width, *rest), (8 - i, *(2,) * (dim - 1)), element, corner)
-        boxes.append(fc.generate.renamed(box, {name: f"{body}_{name}" for name in box.group_names}))
+        boxes[f"{body}_"] = make((width, *rest), (8 - i, *(2,) * (dim - 1)), element, corner)
     turn[:: dim - 1, :: dim - 1] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    mesh = fc.generate.union(*boxes)
+    mesh = united(**boxes)
     mesh = mesh.replace(points=mesh.points @ turn.T)
     low, high, side = ("BOTTOM", "TOP", "RIGHT") if dim == 2 else ("ZMIN", "ZMAX", "XMAX")
     model = made_of(mesh, "plane_strain" if dim == 2 else "3d", fc.LinearElastic(E=50.0, nu=0.3, density=1e-9))
@@ -307,11 +306,7 @@ def test_a_crate_slides_on_a_driven_incline_until_a_spring_holds_it(angle, stiff
     """Base driven along an incline of `angle` (positive: downwards); the spring acts along x, and only contact along y."""
     base = fc.generate.block((0.6, 0.08), (24, 3), "quad4", (-0.3, -0.08))
     crate = fc.generate.block((0.2, 0.12), (10, 6), "quad4", (-0.1, 0.0))
-    boxes = [
-        fc.generate.renamed(box, {name: f"{body}_{name}" for name in ("BOTTOM", "TOP")})
-        for body, box in (("A", base), ("B", crate))
-    ]
-    mesh, slope = fc.generate.transformed(fc.generate.union(*boxes), rotate=-angle), np.radians(angle)
+    mesh, slope = fc.generate.transformed(united(A_=base, B_=crate), rotate=-angle), np.radians(angle)
     model = made_of(mesh, "plane_strain", fc.LinearElastic(E=1e8, nu=0.3, density=600.0))
     model.add_gravity(y=-9.81, ramp=[(0, 0), (1, 1), (2, 1)])
     top = mesh.points_of("B_TOP")
