@@ -19,6 +19,7 @@ pytestmark = pytest.mark.each_value
 block, box, union = fc.generate.block, fc.generate.box, fc.generate.union
 FLAT = ("tri3", "quad4", "tri6", "quad8", "quad9")
 SOLID = ("tet4", "hex8", "wedge6", "pyramid5", "tet10", "hex20", "hex27", "wedge15", "pyramid13")
+STEEL = fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9)
 
 
 def model_of(mesh, kinematics, nu=0.0, E=1.0, **given):
@@ -110,9 +111,7 @@ def test_pressure_follows_the_vibrating_surface():
     """Hydrostatic pressure does not change the frequencies of a cantilever (small and finite strain agree)."""
     free, loaded = {}, {}
     for strain in ("small", "finite"):
-        beam = fc.Model(block((100.0, 8.0), (20, 2), "quad8"), "plane_stress", strain=strain)
-        beam.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
-        beam.fix("LEFT", "xy")
+        beam = made_of(block((100.0, 8.0), (20, 2), "quad8"), "plane_stress", STEEL, strain=strain, LEFT="xy")
         free[strain] = fc.modes(beam, n=1).frequencies[0]
         for side in ("BOTTOM", "TOP"):
             beam.add_pressure(side, 50.0)
@@ -263,21 +262,16 @@ FACES = {"XMIN": "LEFT", "XMAX": "RIGHT", "YMIN": "BOTTOM", "YMAX": "TOP"}
 def plates(turn=0.0, options=None, swapped=False, element="quad8", strain="small"):
     """Return two plates of 100 x 4, clamped at one end and turned in their plane, and the direction across them."""
     flat, c, s = element in FLAT, np.cos(turn), np.sin(turn)
-    parts = []
-    for name, y, n in (("LOW", 0.0, 30), ("UP", 4.0, 24)):
-        part = (
-            block((100.0, 4.0), (n, 2), element, (0.0, y), name=name)
-            if flat
-            else box((100.0, 4.0, 10.0), (n, 1, 2), element, (0.0, y, 0.0), name=name)
-        )
-        parts.append(
-            fc.generate.renamed(part, lambda own, name=name: own if own == name else f"{name} {FACES.get(own, own)}")
-        )
-    mesh = union(*parts)
+    parts = {}
+    for name, y, n in (("LOW ", 0.0, 30), ("UP ", 4.0, 24)):
+        if flat:
+            parts[name] = block((100.0, 4.0), (n, 2), element, (0.0, y))
+        else:
+            parts[name] = fc.generate.renamed(box((100.0, 4.0, 10.0), (n, 1, 2), element, (0.0, y, 0.0)), FACES)
+    mesh = united(**parts)
     turned = mesh.points.copy()
     turned[:, :2] = mesh.points[:, :2] @ [[c, s], [-s, c]]
-    model = fc.Model(mesh.replace(points=turned), "plane_stress" if flat else "3d", strain=strain)
-    model.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
+    model = made_of(mesh.replace(points=turned), "plane_stress" if flat else "3d", STEEL, strain=strain)
     supported(model, **{"LOW LEFT": "xyz"[: mesh.dim], "UP LEFT": "xyz"[: mesh.dim]})
     sides = ("LOW TOP", "UP BOTTOM")[:: 1 if swapped else -1]
     model.add_contact("joint", secondary=sides[0], primary=sides[1], **(options or {}))
@@ -309,8 +303,7 @@ def test_plates_that_forces_of_constant_directions_press_together_vibrate_as_wit
 def test_a_stack_of_plates_under_pressure_vibrates_as_each_plate_between_pressures():
     """The ends are guided. Docs: alone, the plates and the pressure have 334 Hz with a free end."""
     model, _ = plates()
-    alone = fc.Model(block((100.0, 4.0), (30, 2), "quad8"), "plane_stress")
-    alone.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
+    alone = made_of(block((100.0, 4.0), (30, 2), "quad8"), "plane_stress", STEEL)
     for loaded, prefix in ((model, ("LOW ", "UP ")), (alone, ("",))):
         loaded.add_pressure(f"{prefix[-1]}TOP", 50.0)
         loaded.add_pressure(f"{prefix[0]}BOTTOM", 50.0)
