@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from case_texts import case_of
-from models import elastic_model
+from models import elastic_model, made_of
 from refusals import refused
 
 import fastcontact as fc
@@ -315,9 +315,8 @@ def test_a_disc_that_rolls_hardly_needs_a_torque():
     """
     parts = []
     for rolling in (1.0, 0.0):
-        model = fc.Model(fc.generate.block((4.0, 2.0), (24, 8), origin=(-2.0, -2.0)), "plane_strain")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.48, volumetric="mean_dilatation"))
-        model.fix("BOTTOM", "xy")
+        law = fc.LinearElastic(E=1000.0, nu=0.48, volumetric="mean_dilatation")
+        model = made_of(fc.generate.block((4.0, 2.0), (24, 8), origin=(-2.0, -2.0)), "plane_strain", law, BOTTOM="xy")
         centre = (-0.2, 5.0 - 0.02)
         model.add_obstacle(
             "disc", secondary="TOP", obstacle=fc.obstacles.Sphere(centre, 5.0), motion={"x": 0.4}, friction=FRICTION,

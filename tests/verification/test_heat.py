@@ -128,9 +128,8 @@ def test_conductivity_by_axes_and_by_position():
         turned.fix_temperature(side, lambda p: 10.0 * p[:, 0])
     flux = fc.solve(turned, 1)[-1].heat_flux
     assert flux == pytest.approx(np.tile([-30.0, -10.0], (9, 1)), rel=1e-12)  # k_xx = (4 + 2) / 2, k_xy = (4 - 2) / 2
-    graded = fc.Model(fc.generate.block((1.0, 1.0), (64, 1), "quad8"), "plane_strain")
-    graded.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=lambda p: 1.0 + p[:, 0]))
-    graded.fix("LEFT", "xy")
+    law = fc.LinearElastic(E=1.0, nu=0.3, conductivity=lambda p: 1.0 + p[:, 0])
+    graded = made_of(fc.generate.block((1.0, 1.0), (64, 1), "quad8"), "plane_strain", law, LEFT="xy")
     graded.fix_temperature("LEFT", 0.0)
     graded.fix_temperature("RIGHT", 1.0)
     step, x = fc.solve(graded, 1)[-1], graded.mesh.points[:, 0]
@@ -280,9 +279,8 @@ def test_hot_hertz_contact_passes_conductance_times_force():
 
 def test_free_expansion_by_conduction_is_without_stress():
     mesh = fc.generate.block((2.0, 1.0), (4, 2), "quad8")
-    model = fc.Model(mesh, "plane_stress", reference_temperature=20.0)
-    model.add_material(fc.LinearElastic(E=2e5, nu=0.3, expansion=1e-5, conductivity=40.0))
-    supported(model, LEFT="x", BOTTOM_LEFT="y")
+    law = fc.LinearElastic(E=2e5, nu=0.3, expansion=1e-5, conductivity=40.0)
+    model = made_of(mesh, "plane_stress", law, reference_temperature=20.0, LEFT="x", BOTTOM_LEFT="y")
     model.fix_temperature("BLOCK", 120.0)
     step = fc.solve(model, 2)[-1]
     assert step.displacement[:, 0] == pytest.approx(1e-3 * mesh.points[:, 0], abs=1e-14)
@@ -293,9 +291,8 @@ def test_free_expansion_by_conduction_is_without_stress():
 
 def test_temperatures_and_films_come_and_go():
     mesh = fc.generate.block((1.0, 0.5), (4, 2))
-    model = fc.Model(mesh, "plane_strain", reference_temperature=20.0)
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0))
-    model.fix("LEFT", "xy")
+    law = fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0)
+    model = made_of(mesh, "plane_strain", law, reference_temperature=20.0, LEFT="xy")
     model.fix_temperature("LEFT", 100.0, ramp=[(0.0, 1.0), (4.0, 1.0)])
     model.add_film("RIGHT", 2.0, 20.0, ends=2.0)
     model.fix_temperature("RIGHT", 220.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (4.0, 1.0)], begins=1.0, ends=3.0)
