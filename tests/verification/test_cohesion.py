@@ -287,12 +287,8 @@ def test_an_end_loaded_split_grows_as_linear_elastic_fracture_mechanics_predicts
         mesh, (c, s) = fc.generate.transformed(mesh, rotate=30.0), (np.cos(np.pi / 6), np.sin(np.pi / 6))
         axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     strain = "finite" if case == "finite" else "small"
-    model = made_of(
-        mesh,
-        "3d" if case == "3d" else "plane_stress",
-        fc.LinearElastic(E=E, nu=0.0, incompatible_modes=case == "3d"),
-        strain,
-    )
+    elastic = fc.LinearElastic(E=E, nu=0.0, incompatible_modes=case == "3d")
+    model = made_of(mesh, "3d" if case == "3d" else "plane_stress", elastic, strain)
     model.prescribe("ENDS", axes=axes, **{"xyz"[across]: -deflection})
     supported(model, **{f"{body}_{right}": "xyz"[: mesh.dim] for body in ("UP", "LO")})
     sides = ("LO_GLUE", "UP_GLUE") if case == "lower" else ("UP_GLUE", "LO_GLUE")
