@@ -47,10 +47,13 @@ def pressed_spheres(mesh, by=2.0, name="hertz", material=None, strain="small", *
 
 
 def united(**meshes):
-    """Return meshes as one, their groups after a keyword: ``united(L_=lower)`` has L_TOP, but keeps L, the body itself."""
+    """Return meshes as one, their groups after a keyword: ``united(L_=lower)`` has L_TOP, but keeps L, the body itself.
+
+    The last character of a keyword may also be a space: ``united(**{"L ": lower})`` has L TOP.
+    """
     return fc.generate.union(
         *(
-            fc.generate.renamed(mesh, {g: g if start == f"{g}_" else start + g for g in mesh.group_names})
+            fc.generate.renamed(mesh, {g: g if start[:-1] == g else start + g for g in mesh.group_names})
             for start, mesh in meshes.items()
         )
     )

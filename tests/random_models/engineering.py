@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from bodies import Array, Body, Placement, Random, flat, rotation
 from drawing import Draft, add_contact, add_obstacle, material, materials
+from models import supported
 from wording import SpokenModel
 
 import fastcontact as fc
@@ -212,8 +213,7 @@ def bolted(random: Random) -> Draft:
     mesh = fc.generate.cut(mesh, "SECTION")
     draft = begun(random, [first.mesh(Placement(dim)), mesh], kinematics, ["B0", "B1"], length)
     model = draft.model
-    model.fix("B0_BOTTOM", "xyz"[:dim])
-    model.fix("B1_TOP", "xyz"[:dim])
+    supported(model, B0_BOTTOM="xyz"[:dim], B1_TOP="xyz"[:dim])
     if random.random() < 0.5:
         model.add_pretension("bolt", "SECTION", shortening=-down)
     else:
@@ -274,8 +274,7 @@ def heated(random: Random) -> Draft:
     for body in bodies:
         for side in sides:
             model.fix(f"{body.name}_{side}", "normal")
-    model.fix("B0_BOTTOM", "normal")
-    model.fix("B1_TOP", "normal")
+    supported(model, B0_BOTTOM="normal", B1_TOP="normal")
     add_contact(random, draft, ("B1_BOTTOM", "B0_TOP"), 1e-3 * length)
     return draft
 

@@ -3,6 +3,7 @@
 import numpy as np
 from bodies import FLAT, Random
 from drawing import Draft, add_contact, add_obstacle, materials
+from models import supported
 from wording import SpokenModel
 
 import fastcontact as fc
@@ -50,8 +51,7 @@ def discs(random: Random) -> Draft:
     kinematics = str(random.choice(["axisymmetric", "axisymmetric", "plane_strain", "plane_stress"]))
     draft = begun(random, fc.generate.union(*parts, other), kinematics, ["SPHBAS", "SPHHAU"], R, element)
     model = draft.model
-    model.fix("A1A2", "x")
-    model.fix("A1B1", "y")
+    supported(model, A1A2="x", A1B1="y")
     if random.random() < 0.7:
         model.prescribe("A2B2", y=-part * R)
     else:
@@ -72,12 +72,9 @@ def cylinder(random: Random) -> Draft:
     draft = begun(random, mesh, kinematics, ["CYLINDER", "BLOCK"], R, element)
     model = draft.model
     if random.random() < 0.3 and kinematics != "axisymmetric":
-        model.fix("BLOCK_BOTTOM", "xy")
-        model.prescribe("CYLINDER_TOP", x=part * R * random.uniform(-1, 1), y=-part * R)
+        supported(model, BLOCK_BOTTOM="xy", CYLINDER_TOP={"x": part * R * random.uniform(-1, 1), "y": -part * R})
     else:
-        model.fix("AXIS", "x")
-        model.fix("BLOCK_BOTTOM", "y")
-        model.prescribe("CYLINDER_TOP", y=-part * R)
+        supported(model, AXIS="x", BLOCK_BOTTOM="y", CYLINDER_TOP={"y": -part * R})
     add_contact(random, draft, ("CONT_CYLINDER", "CONT_BLOCK"), part * R)
     return draft
 
@@ -94,10 +91,7 @@ def sphere(random: Random) -> Draft:
     )  # fmt: skip
     draft = begun(random, mesh, "3d", ["SPHERE", "BLOCK"], R, element)
     model = draft.model
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Z", "z")
-    model.fix("BLOCK_BOTTOM", "y")
-    model.prescribe("SPHERE_TOP", y=-part * R)
+    supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -part * R})
     add_contact(random, draft, ("CONT_SPHERE", "CONT_BLOCK"), part * R)
     return draft
 
@@ -112,8 +106,7 @@ def rings(random: Random) -> Draft:
     )  # fmt: skip
     draft = begun(random, mesh, str(random.choice(["plane_strain", "plane_stress"])), ["INNER", "OUTER"], R, element)
     model = draft.model
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
+    supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
     # Chords lie closer to their arcs than the bodies are pressed into each other.
     sag = 0.5 * (0.5 * np.pi / (n.min() * (1 if element in ("tri3", "quad4") else 2))) ** 2 / 4
     pressed = R * (sag + part / 10)

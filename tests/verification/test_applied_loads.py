@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -16,8 +16,8 @@ SOLID = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "pyrami
 E, NU = 1000.0, 0.3
 
 
-def model_on(mesh, kinematics):
-    return elastic_model(mesh, kinematics, E=E, nu=NU)
+def model_on(mesh, kinematics, **held):
+    return elastic_model(mesh, kinematics, E=E, nu=NU, **held)
 
 
 # --- exact fields -------------------------------------------------------------------------------------------------
@@ -27,8 +27,7 @@ def model_on(mesh, kinematics):
 @pytest.mark.parametrize("element", PLANE)
 def test_uniform_pressure_gives_a_uniform_stress(element, kinematics):
     mesh = fc.generate.block((2.0, 3.0), (3, 4), element, distortion=0.2 if element in PLANE[:3] else 0.0)
-    model = model_on(mesh, kinematics)
-    supported(model, LEFT="x", BOTTOM="y")
+    model = model_on(mesh, kinematics, LEFT="x", BOTTOM="y")
     model.add_pressure("TOP", 5.0)
     model.add_pressure("RIGHT", 2.0)
     last = fc.solve(model, 1)[-1]
@@ -41,8 +40,7 @@ def test_uniform_pressure_gives_a_uniform_stress(element, kinematics):
 @pytest.mark.parametrize("element", SOLID)
 def test_uniform_pressure_gives_a_uniform_stress_in_3d(element):
     mesh = fc.generate.box((2.0, 3.0, 1.0), (2, 2, 2), element)
-    model = model_on(mesh, "3d")
-    supported(model, XMIN="x", YMIN="y", ZMIN="z")
+    model = model_on(mesh, "3d", XMIN="x", YMIN="y", ZMIN="z")
     model.add_pressure("XMAX", 2.0)
     model.add_traction("YMAX", y=3.0)
     model.add_force("ZMAX", z=-4.0 * 6.0)
@@ -66,8 +64,7 @@ def test_a_thick_cylinder_converges_to_lame(element, order, kinematics):
     sizes, errors = (4, 8, 16), []
     for n in sizes:
         mesh = ring(element, n)
-        model = model_on(mesh, kinematics)
-        supported(model, BOTTOM="y", TOP="x")
+        model = model_on(mesh, kinematics, BOTTOM="y", TOP="x")
         model.add_pressure("LEFT", 10.0)  # the bore
         u = fc.solve(model, 1)[-1].displacement
         r = np.linalg.norm(mesh.points, axis=1)
@@ -84,8 +81,7 @@ def test_an_axisymmetric_cylinder_under_internal_pressure():
         E=E, nu=NU, inner_radius=1.0, outer_radius=2.0, inner_pressure=10.0, kinematics="plane_stress"
     )
     mesh = fc.generate.block((1.0, 0.2), (16, 2), "quad8", origin=(1.0, 0.0))
-    model = model_on(mesh, "axisymmetric")
-    model.fix("BOTTOM", "y")
+    model = model_on(mesh, "axisymmetric", BOTTOM="y")
     model.add_pressure("LEFT", 10.0)
     last = fc.solve(model, 1)[-1]
     r = mesh.points[:, 0]
@@ -158,8 +154,7 @@ def test_a_reference_point_carries_the_force_of_a_face():
     mesh = mesh.with_groups(points={"PILOT": [mesh.n_points - 1]})
     results = []
     for pilot in (False, True):
-        model = model_on(mesh, "plane_stress")
-        model.fix("BOTTOM", "xy")
+        model = model_on(mesh, "plane_stress", BOTTOM="xy")
         if pilot:
             for node in top:
                 model.relate([(int(node), "y", 1.0), ("PILOT", "y", -1.0)])
@@ -175,8 +170,7 @@ def test_a_reference_point_carries_the_force_of_a_face():
 def test_a_relation_with_a_right_hand_side_and_its_reactions():
     """Two halves pulled apart by a given amount: the relation's forces are equal and opposite."""
     mesh = fc.generate.block_on_block("quad4", divisions_lower=(4, 2), divisions_upper=(4, 2))
-    model = model_on(mesh, "plane_stress")
-    supported(model, LOWER_BOTTOM="xy", UPPER_TOP="xy")
+    model = model_on(mesh, "plane_stress", LOWER_BOTTOM="xy", UPPER_TOP="xy")
     lower, upper = mesh.points_of("CONT_LOWER"), mesh.points_of("CONT_UPPER")
     order = [points[np.argsort(mesh.points[points, 0])] for points in (lower, upper)]
     for a, b in zip(*order, strict=True):
@@ -196,8 +190,7 @@ def test_a_relation_with_a_right_hand_side_and_its_reactions():
 
 def test_loads_with_their_own_histories():
     mesh = fc.generate.block((2.0, 1.0), (3, 2), "quad8")
-    model = model_on(mesh, "plane_strain")
-    supported(model, BOTTOM="y", LEFT="x")
+    model = model_on(mesh, "plane_strain", BOTTOM="y", LEFT="x")
     model.add_pressure("TOP", 5.0, ramp=[(0, 0), (1, 1), (3, 1)])
     model.add_pressure("RIGHT", 2.0, ramp=[(0, 0), (1, 0), (2, 1), (3, 0)])
     steps = fc.solve(model, fc.Ramp((0.5, 1.0, 2.0, 3.0), ((0, 0), (3, 7))))
@@ -392,8 +385,7 @@ def stack(load, motion):
     mesh = fc.generate.transform.union(
         two, fc.generate.transform.renamed(top, lambda name: names.get(name, "C" + name))
     )
-    model = model_on(mesh, "plane_strain")
-    supported(model, LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x", CAP_LEFT="x")
+    model = model_on(mesh, "plane_strain", LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x", CAP_LEFT="x")
     if motion:
         model.prescribe("CAP_TOP", y=-motion)
     if load:
@@ -417,8 +409,7 @@ def test_a_body_between_two_others_is_held_by_contact_alone():
 def test_friction_and_weight_hold_a_block(formulation):
     """A block free to move, turn and slide stays on its friction; its tangential force is what is applied."""
     mesh = fc.generate.block_on_block("quad4", divisions_lower=(6, 3), divisions_upper=(6, 3))
-    model = model_on(mesh, "plane_strain")
-    model.fix("LOWER_BOTTOM", "xy")
+    model = model_on(mesh, "plane_strain", LOWER_BOTTOM="xy")
     model.add_pressure("UPPER_TOP", 10.0, ramp=[(0, 0), (0.5, 1), (1, 1)])
     model.add_force("UPPER_LEFT", x=10.0, ramp=[(0, 0), (0.5, 0), (1, 1)])
     model.add_contact("base", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=0.3)
@@ -430,15 +421,9 @@ def test_friction_and_weight_hold_a_block(formulation):
 
 def boxes(lower, upper):
     """Two boxes of other meshes, one on the other."""
-    made = [
-        fc.generate.box((2.0, 2.0, 1.0), (3, 3, 2), lower, name="LOWER"),
-        fc.generate.box((2.0, 2.0, 1.0), (2, 2, 2), upper, (0.0, 0.0, 1.0), name="UPPER"),
-    ]
-    named = [
-        fc.generate.transform.renamed(mesh, lambda name, body=body: name if name == body else f"{body}_{name}")
-        for mesh, body in zip(made, ("LOWER", "UPPER"), strict=True)
-    ]
-    return fc.generate.transform.union(*named)
+    low = fc.generate.box((2.0, 2.0, 1.0), (3, 3, 2), lower, name="LOWER")
+    high = fc.generate.box((2.0, 2.0, 1.0), (2, 2, 2), upper, (0.0, 0.0, 1.0), name="UPPER")
+    return united(LOWER_=low, UPPER_=high)
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])
@@ -456,8 +441,7 @@ def test_a_box_pressed_on_another_in_3d(lower, upper, solver):
 
 
 def test_a_box_held_by_friction_alone_in_3d():
-    model = model_on(boxes("hex8", "hex8"), "3d")
-    model.fix("LOWER_ZMIN", "xyz")
+    model = model_on(boxes("hex8", "hex8"), "3d", LOWER_ZMIN="xyz")
     model.add_contact("base", secondary="UPPER_ZMIN", primary="LOWER_ZMAX", formulation="mortar", friction=0.4)
     model.add_pressure("UPPER_ZMAX", 3.0)
     model.add_force("UPPER_XMIN", x=2.0)

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import made_of
+from models import joined, made_of
 
 import fastcontact as fc
 
@@ -28,13 +28,8 @@ def round_body_on_block(kinematics: str, element: str, laws, contact) -> tuple[f
         sides, top, bottom = ("LEFT",), "TOP", "BOTTOM"
     points = body.points.copy()
     points[:, -1] += 0.15 * (1.0 - points[:, -1]) * (points[:, :-1] ** 2).sum(axis=1)
-    bodies = [
-        fc.generate.renamed(mesh, {name: f"{name}{i}" for name in mesh.group_names})
-        for i, mesh in enumerate((body.replace(points=points), block))
-    ]
-    model = fc.Model(
-        fc.generate.union(*bodies), kinematics, strain="finite" if isinstance(laws[0], fc.NeoHookean) else "small"
-    )
+    mesh = joined({"0": body.replace(points=points), "1": block})
+    model = fc.Model(mesh, kinematics, strain="finite" if isinstance(laws[0], fc.NeoHookean) else "small")
     for i, law in enumerate(laws):
         model.add_material(law, groups=[name for name in (f"BLOCK{i}", f"BOX{i}") if name in model.mesh.group_names])
         for axis, side in zip("xy", sides, strict=False):
@@ -97,11 +92,8 @@ def test_sides_that_overlap_at_the_start_are_told_where_the_motion_is_along_them
     """As those of a snap fit that is pushed on."""
     stub = fc.generate.block((1.0, 2.0), (2, 4), name="STUB")
     cap = fc.generate.block((1.0, 2.0), (2, 4), origin=(1.0 + distance, 0.5), name="CAP")
-    bodies = [
-        fc.generate.renamed(mesh, {side: f"{side}{i}" for side in ("LEFT", "RIGHT", "TOP", "BOTTOM")})
-        for i, mesh in enumerate((stub, cap))
-    ]
-    model = made_of(fc.generate.union(*bodies), "plane_strain", STEEL, LEFT0="xy", RIGHT1={"x": 0.0, "y": -0.5})
+    motion = {"x": 0.0, "y": -0.5}
+    model = made_of(joined({"0": stub, "1": cap}), "plane_strain", STEEL, LEFT0="xy", RIGHT1=motion)
     model.add_contact("bead", secondary="LEFT1", primary="RIGHT0")
     with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")

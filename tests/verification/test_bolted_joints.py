@@ -4,7 +4,7 @@ import contextlib
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 
@@ -82,11 +82,7 @@ def joint(pull, formulation="mortar", locked_from=1.0, first=1.0, tight=1.0):
     low = fc.generate.block((2.0, half), (3, 2), origin=(2.0, 0.0), name="LOW")
     across = 4 if formulation == "mortar" else 3  # only mortar passes a uniform pressure on meshes that do not match
     up = fc.generate.block((2.0, half), (across, 2), origin=(2.0, half), name="UP")
-    parts = [
-        fc.generate.renamed(mesh, lambda group, prefix=prefix: group if group == prefix else f"{prefix} {group}")
-        for prefix, mesh in (("BOLT", bolt), ("LOW", low), ("UP", up))
-    ]
-    mesh = fc.generate.union(*parts)
+    mesh = united(**{"BOLT ": bolt, "LOW ": low, "UP ": up})
     mesh = mesh.with_facet_group("CUT", lambda x: (np.abs(x[:, 1] - half) < 1e-9) & (x[:, 0] < 1.5), between=True)
     mesh = mesh.with_facet_group("HEAD", lambda x: np.abs(x[:, 1] - LENGTH) < 1e-9)
     model = elastic_model(

@@ -29,8 +29,7 @@ def glued(element="quad4", motion=None, E=E, **options):
     lower = make(size, divisions, element, (*origin, 0.0), name="A")
     if motion:
         lower = make((4.0, 1.0), (6, 1), element, (-1.0, 0.0), name="A")
-    bodies = (lower, make(size, divisions, element, (*origin, 1.0), name="B"))
-    mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, n=n: f"{n} {g}") for b, n in zip(bodies, "AB")))
+    mesh = united(**{"A ": lower, "B ": make(size, divisions, element, (*origin, 1.0), name="B")})
     model = elastic_model(mesh, "3d" if element == "hex8" else "plane_strain", E=E, nu=0.0)
     supported(model, **{f"A {bottom}": axes, f"B {top}": {**dict.fromkeys(axes, 0.0), **(motion or {axes[-1]: 1.0})}})
     law = {"strength": STRENGTH, "energy": ENERGY, "stiffness": STIFFNESS, **options.pop("law", {})}
@@ -100,9 +99,9 @@ def test_mixed_modes_take_the_energy_of_benzeggagh_and_kenane(angle):
 def test_a_double_cantilever_beam_follows_beam_theory(options):
     """P = sqrt(G E I) / l and d = 2 P l^3 / (3 E I), per width, once the crack runs (Williams, 1989); elastic before."""
     n, h, a, E, G = 70, 1.5, 30.0, 120e3, 0.26
-    beams = [fc.generate.block((70.0, h), (n, 1), "quad8", (0.0, y), name=k) for k, y in (("UP", 0.0), ("LOW", -h))]
-    mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, k=k: f"{k} {g}") for b, k in zip(beams, ("UP", "LOW"))))
-    mesh = mesh.with_facet_group("GLUE", lambda x: (np.abs(x[:, 1]) < 1e-9) & (x[:, 0] > a - 1e-9), of="UP UP")
+    upper, lower = (fc.generate.block((70.0, h), (n, 1), "quad8", (0.0, y), name="BEAM") for y in (0.0, -h))
+    mesh = united(**{"UP ": upper, "LOW ": lower})
+    mesh = mesh.with_facet_group("GLUE", lambda x: (np.abs(x[:, 1]) < 1e-9) & (x[:, 0] > a - 1e-9), of="UP BEAM")
     model = elastic_model(mesh, "plane_stress", E=E, nu=0.0)
     supported(model, **{"UP TOP_LEFT": {"y": 2.0}, "LOW BOTTOM_LEFT": {"y": -2.0}})
     for corner in ("UP BOTTOM_RIGHT", "LOW TOP_RIGHT"):
@@ -288,12 +287,8 @@ def test_an_end_loaded_split_grows_as_linear_elastic_fracture_mechanics_predicts
         mesh, (c, s) = fc.generate.transformed(mesh, rotate=30.0), (np.cos(np.pi / 6), np.sin(np.pi / 6))
         axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     strain = "finite" if case == "finite" else "small"
-    model = made_of(
-        mesh,
-        "3d" if case == "3d" else "plane_stress",
-        fc.LinearElastic(E=E, nu=0.0, incompatible_modes=case == "3d"),
-        strain,
-    )
+    elastic = fc.LinearElastic(E=E, nu=0.0, incompatible_modes=case == "3d")
+    model = made_of(mesh, "3d" if case == "3d" else "plane_stress", elastic, strain)
     model.prescribe("ENDS", axes=axes, **{"xyz"[across]: -deflection})
     supported(model, **{f"{body}_{right}": "xyz"[: mesh.dim] for body in ("UP", "LO")})
     sides = ("LO_GLUE", "UP_GLUE") if case == "lower" else ("UP_GLUE", "LO_GLUE")

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres, supported, united
+from models import elastic_model, made_of, pressed_spheres, supported, united
 from refusals import refused
 
 import fastcontact as fc
@@ -56,13 +56,10 @@ def test_a_uniform_pressure(element, kinematics):
 def test_what_a_press_fit_holds(element, tmp_path):
     """The force on the seat of a bush cancels all round; the normal forces are Lame's pressure times the area."""
     inner, seat, outer, length = 15.0, 40.0, 60.0, 20.0
-    parts = []
-    for name, left, right in (("SHAFT", inner, seat), ("HUB", seat, outer)):
-        part = fc.generate.block((right - left, length), (24, 4), element, origin=(left, 0.0), name=name)
-        parts.append(fc.generate.renamed(part, lambda group, name=name: group if group == name else f"{name} {group}"))
-    model = fc.Model(fc.generate.union(*parts), "axisymmetric")
-    model.add_material(fc.LinearElastic(E=210e3, nu=0.3), "SHAFT")
-    model.add_material(fc.LinearElastic(E=105e3, nu=0.34), "HUB")
+    shaft = fc.generate.block((seat - inner, length), (24, 4), element, origin=(inner, 0.0), name="SHAFT")
+    hub = fc.generate.block((outer - seat, length), (24, 4), element, origin=(seat, 0.0), name="HUB")
+    laws = {"SHAFT": fc.LinearElastic(E=210e3, nu=0.3), "HUB": fc.LinearElastic(E=105e3, nu=0.34)}
+    model = made_of(united(**{"SHAFT ": shaft, "HUB ": hub}), "axisymmetric", laws)
     for name in ("SHAFT", "HUB"):
         model.fix(f"{name} BOTTOM", "y")
         model.couple(f"{name} TOP", "y")
@@ -167,11 +164,9 @@ def test_a_block_that_slides_wears_by_pressure_times_way(element, steps):
 def test_wear_of_two_bodies_and_of_an_obstacle_that_moves():
     """The same way, whichever of the two moves."""
     low = fc.generate.block((4.0, HEIGHT), (8, 2), origin=(-1.0, -HEIGHT), name="LOW")
-    low = fc.generate.renamed(low, lambda g: g if g == "LOW" else f"LOW {g}")
-    model = fc.Model(fc.generate.union(low, fc.generate.block((2.0, HEIGHT), (4, 2))), "plane_stress")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0), "BLOCK")
-    model.add_material(fc.LinearElastic(E=1e4 * E, nu=0.0), "LOW")
-    model.fix("LOW BOTTOM", "y")
+    mesh = fc.generate.union(united(**{"LOW ": low}), fc.generate.block((2.0, HEIGHT), (4, 2)))
+    laws = {"BLOCK": fc.LinearElastic(E=E, nu=0.0), "LOW": fc.LinearElastic(E=1e4 * E, nu=0.0)}
+    model = made_of(mesh, "plane_stress", laws, **{"LOW BOTTOM": "y"})
     model.prescribe("LOW BOTTOM", x=-0.3, ramp=RAMP_ALONG)
     pressed(model, 0.01, ramp=RAMP_DOWN)
     model.fix("TOP", "x")

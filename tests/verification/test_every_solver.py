@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 import pytest
 from mechanics import contact_forces, given_back, in_space, out_of_balance
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.mesh.generate.box import SOLIDS
@@ -67,11 +67,8 @@ def bodies(kinematics, element, alone):
         sides = ("LOWER_BOTTOM", "LOWER_TOP", "UPPER_BOTTOM", "UPPER_TOP")
     points = np.array(upper.points)
     points[:, -1] += 0.02 * (points[:, :-1] ** 2).sum(axis=1)
-    parts = [
-        fc.generate.renamed(mesh, {group: f"{name}_{group}" for group in mesh.group_names if group != name})
-        for name, mesh in (("LOWER", lower), ("UPPER", upper.replace(points=points)))
-    ]
-    return parts[1] if alone else fc.generate.union(*parts), sides
+    upper = upper.replace(points=points)
+    return united(UPPER_=upper) if alone else united(LOWER_=lower, UPPER_=upper), sides
 
 
 def model(kinematics, element, formulation, friction, penalty, swapped=False, obstacle=False):

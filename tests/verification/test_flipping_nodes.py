@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres
+from models import elastic_model, pressed_spheres, united
 
 import fastcontact as fc
 
@@ -25,7 +25,7 @@ def test_the_force_between_spheres_is_that_of_averaged_normals():
 
 def pressed(element, cells, swapped, friction):
     """A round block pressed on a hollow one, by node-to-segment contact with the normals of facets."""
-    parts = []
+    parts = {}
     for name, size, count, bend in (("LOW", 1.4, cells[0], 0.08), ("UP", 1.0, cells[1], 0.1)):
         lower = name == "LOW"
         mesh = fc.generate.box(
@@ -34,12 +34,8 @@ def pressed(element, cells, swapped, friction):
         points = np.array(mesh.points)
         share = (points[:, 2] + 0.7) / 0.7 if lower else 1.0
         points[:, 2] += bend * share * (points[:, :2] ** 2).sum(axis=1)
-        parts.append(
-            fc.generate.renamed(
-                mesh.replace(points=points), {group: f"{name}_{group}" for group in mesh.group_names if group != name}
-            )
-        )
-    model = elastic_model(fc.generate.union(*parts), "3d", LOW_ZMIN="xyz", UP_ZMAX={"x": 0.0, "y": 0.0, "z": -0.02})
+        parts[f"{name}_"] = mesh.replace(points=points)
+    model = elastic_model(united(**parts), "3d", LOW_ZMIN="xyz", UP_ZMAX={"x": 0.0, "y": 0.0, "z": -0.02})
     sides = ("LOW_ZMAX", "UP_ZMIN") if swapped else ("UP_ZMIN", "LOW_ZMAX")
     model.add_contact(
         "pair", secondary=sides[0], primary=sides[1], formulation="node_to_segment", normals="facet", friction=friction

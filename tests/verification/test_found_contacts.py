@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model, made_of, supported, united
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -174,14 +174,9 @@ def test_softer_bodies_are_secondary_and_pairs_by_name_stay():
 @pytest.mark.parametrize("element", ["quad4", "quad8"])
 def test_softer_bodies_are_secondary_even_with_coarser_meshes(element):
     parts = [("STRIP", (20.0, 2.0), (24, 2), 0.0), ("BASE", (20.0, 8.0), (16, 5), -8.0)]
-    strip, base = (
-        fc.generate.renamed(
-            block(size, n, element, (0.0, y), name=name), lambda g, name=name: g if g == name else f"{name} {g}"
-        )
-        for name, size, n, y in parts
-    )
+    mesh = united(**{f"{name} ": block(size, n, element, (0.0, y), name=name) for name, size, n, y in parts})
     materials = {"STRIP": fc.LinearElastic(E=200e3, nu=0.3), "BASE": fc.LinearElastic(E=500.0, nu=0.3)}
-    model = made_of(union(strip, base), "plane_strain", materials)
+    model = made_of(mesh, "plane_strain", materials)
     for body in ("STRIP", "BASE"):
         supported(model, **{f"{body} LEFT": "x", f"{body} RIGHT": "x"})
     model.fix("BASE BOTTOM", "y")

@@ -28,10 +28,6 @@ def turn(dim, seed):
     return Q
 
 
-def prefixed(mesh, name):
-    return fc.generate.renamed(mesh, lambda group: group if group == name else f"{name}_{group}")
-
-
 def blocks(element, dim):
     """A wide block A and a smaller one B on it that does not match."""
     if dim == 2:
@@ -94,10 +90,11 @@ def test_a_block_driven_over_a_plane_carries_all_friction(formulation, said, gro
 @pytest.mark.parametrize("elements", [("hex8", "tet4"), ("hex20", "hex20")])
 def test_bodies_pressed_uniformly_have_no_shear_in_planes_of_symmetry(said, seed, elements):
     """A quarter of two boxes: uniform pressure, by whatever words the planes are held, and however the model is turned."""
-    parts = []
-    for name, element, n, z in zip("LU", elements, (2, 3), (-0.5, 0.0), strict=True):
-        parts.append(prefixed(fc.generate.box((1.0, 1.0, 0.5), (n, n, 1), element, origin=(0, 0, z), name=name), name))
-    mesh, Q = fc.generate.union(*parts), turn(3, seed)
+    lower, upper = (
+        fc.generate.box((1.0, 1.0, 0.5), (n, n, 1), element, origin=(0, 0, z))
+        for element, n, z in zip(elements, (2, 3), (-0.5, 0.0), strict=True)
+    )
+    mesh, Q = united(L_=lower, U_=upper), turn(3, seed)
     model = elastic_model(mesh.replace(points=mesh.points @ Q.T), "3d")
     for group, axis in (("L_ZMIN", 2), ("L_XMIN", 0), ("U_XMIN", 0), ("L_YMIN", 1), ("U_YMIN", 1)):
         if said == "fix":
@@ -156,11 +153,10 @@ def test_friction_that_would_hold_rigid_bodies_is_told_as_such():
 @pytest.mark.parametrize("along", [0.31, 0.35])
 def test_a_stack_that_slides_in_its_weaker_joint_is_told_as_such(along):
     """Coulomb's cone in 3D lies between pyramids that differ by 8 %: the first load is between them, the second beyond."""
-    boxes = [
-        prefixed(fc.generate.box((3.0, 3.0, 1.0), (2, 2, 1), "hex8", (0.0, 0.0, z), name=n), n)
-        for z, n in enumerate("AB")
-    ]
-    model = elastic_model(fc.generate.union(*boxes), "3d")
+    boxes = {
+        f"{n}_": fc.generate.box((3.0, 3.0, 1.0), (2, 2, 1), "hex8", (0, 0, z), name=n) for z, n in enumerate("AB")
+    }
+    model = elastic_model(united(**boxes), "3d")
     model.add_body_force(x=along, z=-1.0)
     floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
     model.add_obstacle("floor", secondary="A_ZMIN", obstacle=floor, friction=0.5)
@@ -174,8 +170,8 @@ def flange(name, bottom, element="hex8", divisions=(4, 12, 2)):
     """A quarter of a plate with a hole in the midst."""
     mesh = fc.generate.box((1.0, 1.0, 8.0), divisions, element, (0.0, 0.0, bottom), name=name)
     radius, angle = 20.0 + 40.0 * mesh.points[:, 0], np.pi / 2.0 * mesh.points[:, 1]
-    mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), mesh.points[:, 2]]))
-    return prefixed(mesh, name)
+    points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), mesh.points[:, 2]])
+    return united(**{f"{name}_": mesh.replace(points=points)})
 
 
 @pytest.mark.filterwarnings("ignore:.*nodal pressures oscillate", "ignore:.*across its radius")
@@ -251,11 +247,9 @@ def test_the_force_between_clamped_plates_is_accurate_on_coarse_meshes(element, 
     forces = []
     coarse = [(element, upper, lower, 1) for upper, lower in ((4, 4), (4, 6), (6, 4))]
     for kind, upper, lower, height in [("quad4", 120, 120, 12), *coarse]:
-        parts = [
-            prefixed(fc.generate.block((60.0, 6.0), (n, height), kind, (40.0, y), name=name), name)
-            for name, n, y in (("A", lower, -6.0), ("B", upper, 0.0))
-        ]
-        model = elastic_model(fc.generate.union(*parts), "axisymmetric", E=210e3)
+        a = fc.generate.block((60.0, 6.0), (lower, height), kind, (40.0, -6.0), name="A")
+        b = fc.generate.block((60.0, 6.0), (upper, height), kind, (40.0, 0.0), name="B")
+        model = elastic_model(united(A_=a, B_=b), "axisymmetric", E=210e3)
         for name, outside in (("A", "BOTTOM"), ("B", "TOP")):
             model.fix(f"{name}_LEFT", "xy")
             model.add_pressure(f"{name}_{outside}", 1.0)

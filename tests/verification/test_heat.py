@@ -7,6 +7,7 @@ import pytest
 from case_texts import case_of, contact_pair
 from models import made_of, supported
 from pairwise import first_of
+from refusals import refused
 from scipy.optimize import brentq
 
 import fastcontact as fc
@@ -120,8 +121,7 @@ def test_cylinder_wall_has_the_logarithmic_profile():
 
 def test_wall_between_films_with_a_flux_and_a_source():
     mesh = fc.generate.block((1.0, 0.5), (4, 2), "quad8")
-    model = fc.Model(mesh, "plane_strain", reference_temperature=20.0)
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0))
+    model = made_of(mesh, "plane_strain", fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0), reference_temperature=20.0)
     model.fix("LEFT", "xy")
     model.add_film("LEFT", 10.0, 80.0)
     model.add_heat_flux("RIGHT", 30.0)
@@ -144,9 +144,8 @@ def test_conductivity_by_axes_and_by_position():
         turned.fix_temperature(side, lambda p: 10.0 * p[:, 0])
     flux = fc.solve(turned, 1)[-1].heat_flux
     assert flux == pytest.approx(np.tile([-30.0, -10.0], (9, 1)), rel=1e-12)  # k_xx = (4 + 2) / 2, k_xy = (4 - 2) / 2
-    graded = fc.Model(fc.generate.block((1.0, 1.0), (64, 1), "quad8"), "plane_strain")
-    graded.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=lambda p: 1.0 + p[:, 0]))
-    graded.fix("LEFT", "xy")
+    law = fc.LinearElastic(E=1.0, nu=0.3, conductivity=lambda p: 1.0 + p[:, 0])
+    graded = made_of(fc.generate.block((1.0, 1.0), (64, 1), "quad8"), "plane_strain", law, LEFT="xy")
     graded.fix_temperature("LEFT", 0.0)
     graded.fix_temperature("RIGHT", 1.0)
     step, x = fc.solve(graded, 1)[-1], graded.mesh.points[:, 0]
@@ -258,9 +257,7 @@ def test_tables_are_their_functions_and_steps_begin_where_others_ended():
 
 def test_heat_of_friction_leaves_through_films():
     mesh = fc.generate.block_on_block("quad4", size_lower=(20.0, 5.0), shift=2.0)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0, conductivity=3.0))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = made_of(mesh, "plane_strain", fc.LinearElastic(E=1000.0, nu=0.0, conductivity=3.0), LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", y=-0.05, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (4.0, 1.0)])
     model.prescribe("UPPER_TOP", x=1.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (4.0, 2.0)])
     model.add_contact(
@@ -298,9 +295,8 @@ def test_hot_hertz_contact_passes_conductance_times_force():
 
 def test_free_expansion_by_conduction_is_without_stress():
     mesh = fc.generate.block((2.0, 1.0), (4, 2), "quad8")
-    model = fc.Model(mesh, "plane_stress", reference_temperature=20.0)
-    model.add_material(fc.LinearElastic(E=2e5, nu=0.3, expansion=1e-5, conductivity=40.0))
-    supported(model, LEFT="x", BOTTOM_LEFT="y")
+    law = fc.LinearElastic(E=2e5, nu=0.3, expansion=1e-5, conductivity=40.0)
+    model = made_of(mesh, "plane_stress", law, reference_temperature=20.0, LEFT="x", BOTTOM_LEFT="y")
     model.fix_temperature("BLOCK", 120.0)
     step = fc.solve(model, 2)[-1]
     assert step.displacement[:, 0] == pytest.approx(1e-3 * mesh.points[:, 0], abs=1e-14)
@@ -311,9 +307,8 @@ def test_free_expansion_by_conduction_is_without_stress():
 
 def test_temperatures_and_films_come_and_go():
     mesh = fc.generate.block((1.0, 0.5), (4, 2))
-    model = fc.Model(mesh, "plane_strain", reference_temperature=20.0)
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0))
-    model.fix("LEFT", "xy")
+    law = fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0)
+    model = made_of(mesh, "plane_strain", law, reference_temperature=20.0, LEFT="xy")
     model.fix_temperature("LEFT", 100.0, ramp=[(0.0, 1.0), (4.0, 1.0)])
     model.add_film("RIGHT", 2.0, 20.0, ends=2.0)
     model.fix_temperature("RIGHT", 220.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (4.0, 1.0)], begins=1.0, ends=3.0)
@@ -378,63 +373,50 @@ def joined(model, **options):
 
 
 def test_what_cannot_be_is_refused_by_its_name():
-    refused = pytest.raises
     model = bar()
     model.fix_temperature("UPPER_TOP", 1.0)
-    with refused(fc.errors.ModelError, match="material without conductivity: define it"):
-        model.check()
+    refused(fc.errors.ModelError, "material without conductivity: define it", model.check)
     model = joined(bar(conductivity=1.0))
     model.fix_temperature("UPPER_TOP", 1.0)
-    with refused(fc.errors.ModelError, match="nothing determines the temperature of body 'LOWER'"):
-        model.check()
+    refused(fc.errors.ModelError, "nothing determines the temperature of body 'LOWER'", model.check)
     model = joined(bar(conductivity=1.0), conductance=2.0)
     model.fix_temperature("UPPER_TOP", 1.0)
     model.check()
     model.fix_temperature("UPPER_TOP_LEFT", 2.0)
-    with refused(fc.errors.ModelError, match="prescribe different temperatures at point"):
-        model.check()
+    refused(fc.errors.ModelError, "prescribe different temperatures at point", model.check)
     model = joined(bar(conductivity=1.0, expansion=1.0), conductance=2.0)
     model.fix_temperature("UPPER_TOP", 1.0)
     model.add_temperature(3.0)
-    with refused(fc.errors.ModelError, match="both given by add_temperature and computed"):
-        model.check()
+    refused(fc.errors.ModelError, "both given by add_temperature and computed", model.check)
     model = fc.Model(model.mesh, "plane_strain")
     for group, expansion in (("UPPER", 1.0), ("LOWER", None)):
         model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=1.0, expansion=expansion), group)
     model.fix_temperature("UPPER_TOP", 1.0)
-    with refused(fc.errors.ModelError, match="some materials have a coefficient of thermal expansion, but that with"):
-        joined(model, conductance=2.0).check()
+    message = "some materials have a coefficient of thermal expansion, but that with"
+    refused(fc.errors.ModelError, message, joined(model, conductance=2.0).check)
     model = bar(conductivity=1.0)
     for wrong in ("much", [(1.0, 2.0), (0.0, 3.0)], {"force": [(0.0, 1.0)]}, [(0.0, -1.0)]):
-        with refused(fc.errors.ContactError, match="conductance of contact 'c' must be a number, a function"):
-            joined(model, conductance=wrong)
-    with refused(fc.errors.ContactError, match="zero or more"):
-        joined(model, conductance=-1.0)
-    with refused(fc.errors.ContactError, match="no friction that could generate it"):
-        joined(model, friction_heat=0.5)
-    with refused(fc.errors.ContactError, match="needs the temperature of its obstacle"):
-        model.add_obstacle(
-            "o", secondary="UPPER_TOP", obstacle=fc.obstacles.HalfSpace((0, 9), (0, -1)), conductance=1.0
-        )
-    with refused(fc.errors.ModelError, match="the conductivity"):
-        fc.LinearElastic(E=1.0, nu=0.3, conductivity=0.0)
-    with refused(fc.errors.ModelError, match="must not be negative"):
-        film = bar(conductivity=1.0)
-        film.add_film("UPPER_TOP", -1.0, 0.0)
-        joined(film, conductance=1.0).check()
-        fc.solve(film, 1)
+        message = "conductance of contact 'c' must be a number, a function"
+        refused(fc.errors.ContactError, message, joined, model, conductance=wrong)
+    refused(fc.errors.ContactError, "zero or more", joined, model, conductance=-1.0)
+    refused(fc.errors.ContactError, "no friction that could generate it", joined, model, friction_heat=0.5)
+    obstacle = {"secondary": "UPPER_TOP", "obstacle": fc.obstacles.HalfSpace((0, 9), (0, -1)), "conductance": 1.0}
+    refused(fc.errors.ContactError, "needs the temperature of its obstacle", model.add_obstacle, "o", **obstacle)
+    refused(fc.errors.ModelError, "the conductivity", fc.LinearElastic, E=1.0, nu=0.3, conductivity=0.0)
+    film = joined(bar(conductivity=1.0), conductance=1.0)
+    film.add_film("UPPER_TOP", -1.0, 0.0)
+    film.check()
+    refused(fc.errors.ModelError, "must not be negative", fc.solve, film, 1)
 
 
 @pytest.mark.filterwarnings(REST)
 def test_functions_that_are_no_conductance_and_bodies_that_no_heat_reaches():
     model = joined(bar(conductivity=1.0), conductance=lambda p, g: p - 1.0)
     model.fix_temperature("UPPER_TOP", 1.0)
-    with pytest.raises(fc.errors.ContactError, match="must return a nonnegative number"):
-        fc.solve(model, 1)
+    refused(fc.errors.ContactError, "must return a nonnegative number", fc.solve, model, 1)
     model = joined(bar(conductivity=1.0), conductance=lambda p, g: p["force"])
     model.fix_temperature("UPPER_TOP", 1.0)
-    with pytest.raises(fc.errors.ContactError, match="the conductance of contact 'c' fails: IndexError"):
-        fc.solve(model, 1)
+    refused(fc.errors.ContactError, "the conductance of contact 'c' fails: IndexError", fc.solve, model, 1)
     numbers = itertools.cycle((0.1, 10.0))
     model = joined(bar(conductivity=1.0, expansion=1e-3), conductance=lambda p, g: next(numbers))
     model.fix_temperature("UPPER_TOP", 1.0)
@@ -443,8 +425,7 @@ def test_functions_that_are_no_conductance_and_bodies_that_no_heat_reaches():
         fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
     model = joined(bar(conductivity=1.0), conductance=5.0, clearance=0.1)
     model.fix_temperature("UPPER_TOP", 1.0)
-    with pytest.raises(fc.errors.ConvergenceError, match="no heat reaches body 'LOWER'"):
-        fc.solve(model, 1)
+    refused(fc.errors.ConvergenceError, "no heat reaches body 'LOWER'", fc.solve, model, 1)
 
 
 LOWER = """[[material]]

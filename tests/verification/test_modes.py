@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, made_of, supported, united
 from refusals import refused
 from scipy.sparse import csr_array
 
@@ -19,12 +19,11 @@ pytestmark = pytest.mark.each_value
 block, box, union = fc.generate.block, fc.generate.box, fc.generate.union
 FLAT = ("tri3", "quad4", "tri6", "quad8", "quad9")
 SOLID = ("tet4", "hex8", "wedge6", "pyramid5", "tet10", "hex20", "hex27", "wedge15", "pyramid13")
+STEEL = fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9)
 
 
-def model_of(mesh, kinematics, nu=0.0, E=1.0, **options):
-    model = fc.Model(mesh, kinematics, **options)
-    model.add_material(fc.LinearElastic(E=E, nu=nu, density=1.0))
-    return model
+def model_of(mesh, kinematics, nu=0.0, E=1.0, **given):
+    return made_of(mesh, kinematics, fc.LinearElastic(E=E, nu=nu, density=1.0), **given)
 
 
 def bar(element, kinematics, n=(1, 16), name="BAR", bottom=0.0, height=1.0):
@@ -85,12 +84,10 @@ def test_a_free_body_moves_rigidly_and_vibrates(kinematics, rigid, solver):
 
 def test_a_clamped_disc_and_a_ring():
     """``10.2158 / (2 pi R^2) sqrt(D / (density h))`` of a thin plate; ``sqrt(E / density) / (2 pi R)`` of a thin ring."""
-    plate = model_of(block((1.0, 0.02), (60, 2), "quad8"), "axisymmetric", 0.3)
-    supported(plate, RIGHT="xy", LEFT="x")
+    plate = model_of(block((1.0, 0.02), (60, 2), "quad8"), "axisymmetric", 0.3, RIGHT="xy", LEFT="x")
     stiff = 0.02**3 / (12 * (1 - 0.09))
     assert fc.modes(plate, n=1).frequencies[0] == pytest.approx(10.2158 / (2 * np.pi) * np.sqrt(stiff / 0.02), rel=1e-3)
-    ring = model_of(block((0.01, 0.01), (1, 1), "quad8", origin=(0.995, 0.0)), "axisymmetric", 0.3)
-    ring.fix("BOTTOM", "y")
+    ring = model_of(block((0.01, 0.01), (1, 1), "quad8", origin=(0.995, 0.0)), "axisymmetric", 0.3, BOTTOM="y")
     assert fc.modes(ring, n=1).frequencies[0] == pytest.approx(1 / (2 * np.pi), rel=1e-4)
     # The hoop stress due to a traction of fixed direction and size stiffens the ring: E + stress in place of E.
     ring.add_traction("LEFT", x=0.001 / 0.995)
@@ -102,8 +99,7 @@ def test_a_rotating_beam_is_softer_in_the_plane_of_rotation():
     """Frequencies in and out of the plane of rotation differ by the speed: w_out^2 - w_in^2 = Omega^2 (Southwell)."""
     values = []
     for direction in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)):
-        beam = model_of(block((1.0, 0.02), (40, 2), "quad8"), "plane_stress")
-        beam.fix("LEFT", "xy")
+        beam = model_of(block((1.0, 0.02), (40, 2), "quad8"), "plane_stress", LEFT="xy")
         beam.add_centrifugal(0.01, direction=direction, origin=(0.0, 0.01, 0.0))
         values.append(fc.modes(beam, fc.solve(beam, 1)[-1], 1).eigenvalues[0])
     assert values[1] - values[0] == pytest.approx(0.01**2, rel=1e-3)
@@ -115,9 +111,7 @@ def test_pressure_follows_the_vibrating_surface():
     """Hydrostatic pressure does not change the frequencies of a cantilever (small and finite strain agree)."""
     free, loaded = {}, {}
     for strain in ("small", "finite"):
-        beam = fc.Model(block((100.0, 8.0), (20, 2), "quad8"), "plane_stress", strain=strain)
-        beam.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
-        beam.fix("LEFT", "xy")
+        beam = made_of(block((100.0, 8.0), (20, 2), "quad8"), "plane_stress", STEEL, strain=strain, LEFT="xy")
         free[strain] = fc.modes(beam, n=1).frequencies[0]
         for side in ("BOTTOM", "TOP"):
             beam.add_pressure(side, 50.0)
@@ -175,8 +169,7 @@ def test_what_is_tied_or_sticks_vibrates_as_the_whole_body(kinematics, element, 
     def halves(**more):
         low = bar(element, kinematics, (n[0 if linear else 1], 4 if linear else 8), "LOW", height=0.1)
         mesh = union(low, bar(element, kinematics, (n[0], 4 if linear else 8), "UP", 0.1, 0.1))
-        model = model_of(mesh, kinematics)
-        model.fix("LOW BOTTOM", "xyz"[: mesh.dim])
+        model = model_of(mesh, kinematics, **{"LOW BOTTOM": "xyz"[: mesh.dim]})
         model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options, **more)
         model.add_pressure("UP TOP", 1e-3)
         return model
@@ -208,8 +201,7 @@ def test_what_slides_is_free_along_the_surface_unless_it_is_held():
     )
     found = {}
     for name, options in {"slides": {"friction": 0.05}, "tied": {"kind": "tied"}}.items():
-        model = model_of(mesh, "plane_strain")
-        supported(model, **{"LOW BOTTOM": "xy", "UP TOP": {"x": 2e-4, "y": -2e-4}})
+        model = model_of(mesh, "plane_strain", **{"LOW BOTTOM": "xy", "UP TOP": {"x": 2e-4, "y": -2e-4}})
         model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options)
         (step,) = fc.solve(model, 1)
         own = {"stress_stiffening": False, "n": 3}
@@ -227,8 +219,7 @@ def test_a_warning_counts_modes_that_friction_would_hold():
     )
 
     def pressed(push: dict[str, float], **options: float) -> fc.Model:
-        model = model_of(mesh, "plane_strain")
-        model.fix("LOW BOTTOM", "xy")
+        model = model_of(mesh, "plane_strain", **{"LOW BOTTOM": "xy"})
         model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options)
         if push:
             model.prescribe("UP TOP", **push)
@@ -253,8 +244,7 @@ def test_a_loaded_disc_between_plates_turns_freely(solver):
     half = union(quarter, fc.generate.mirrored(quarter, "x"))
     mesh = fc.generate.merge_points(union(half, fc.generate.mirrored(half, "y")), 1e-6)
     middle = int(np.linalg.norm(mesh.points, axis=1).argmin())
-    model = model_of(mesh.replace(point_groups={"MIDDLE": [middle]}), "plane_strain", nu=0.3)
-    model.fix("MIDDLE", "x")
+    model = model_of(mesh.replace(point_groups={"MIDDLE": [middle]}), "plane_strain", nu=0.3, MIDDLE="x")
     for name, y, motion in (("floor", -2.5, None), ("lid", 2.5, {"y": -1e-3})):
         plate = fc.obstacles.HalfSpace((0.0, y), (0.0, -np.sign(y)))
         model.add_obstacle(name, secondary="CONT1", obstacle=plate, motion=motion)
@@ -272,21 +262,16 @@ FACES = {"XMIN": "LEFT", "XMAX": "RIGHT", "YMIN": "BOTTOM", "YMAX": "TOP"}
 def plates(turn=0.0, options=None, swapped=False, element="quad8", strain="small"):
     """Return two plates of 100 x 4, clamped at one end and turned in their plane, and the direction across them."""
     flat, c, s = element in FLAT, np.cos(turn), np.sin(turn)
-    parts = []
-    for name, y, n in (("LOW", 0.0, 30), ("UP", 4.0, 24)):
-        part = (
-            block((100.0, 4.0), (n, 2), element, (0.0, y), name=name)
-            if flat
-            else box((100.0, 4.0, 10.0), (n, 1, 2), element, (0.0, y, 0.0), name=name)
-        )
-        parts.append(
-            fc.generate.renamed(part, lambda own, name=name: own if own == name else f"{name} {FACES.get(own, own)}")
-        )
-    mesh = union(*parts)
+    parts = {}
+    for name, y, n in (("LOW ", 0.0, 30), ("UP ", 4.0, 24)):
+        if flat:
+            parts[name] = block((100.0, 4.0), (n, 2), element, (0.0, y))
+        else:
+            parts[name] = fc.generate.renamed(box((100.0, 4.0, 10.0), (n, 1, 2), element, (0.0, y, 0.0)), FACES)
+    mesh = united(**parts)
     turned = mesh.points.copy()
     turned[:, :2] = mesh.points[:, :2] @ [[c, s], [-s, c]]
-    model = fc.Model(mesh.replace(points=turned), "plane_stress" if flat else "3d", strain=strain)
-    model.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
+    model = made_of(mesh.replace(points=turned), "plane_stress" if flat else "3d", STEEL, strain=strain)
     supported(model, **{"LOW LEFT": "xyz"[: mesh.dim], "UP LEFT": "xyz"[: mesh.dim]})
     sides = ("LOW TOP", "UP BOTTOM")[:: 1 if swapped else -1]
     model.add_contact("joint", secondary=sides[0], primary=sides[1], **(options or {}))
@@ -318,8 +303,7 @@ def test_plates_that_forces_of_constant_directions_press_together_vibrate_as_wit
 def test_a_stack_of_plates_under_pressure_vibrates_as_each_plate_between_pressures():
     """The ends are guided. Docs: alone, the plates and the pressure have 334 Hz with a free end."""
     model, _ = plates()
-    alone = fc.Model(block((100.0, 4.0), (30, 2), "quad8"), "plane_stress")
-    alone.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
+    alone = made_of(block((100.0, 4.0), (30, 2), "quad8"), "plane_stress", STEEL)
     for loaded, prefix in ((model, ("LOW ", "UP ")), (alone, ("",))):
         loaded.add_pressure(f"{prefix[-1]}TOP", 50.0)
         loaded.add_pressure(f"{prefix[0]}BOTTOM", 50.0)
@@ -335,11 +319,10 @@ def test_a_stack_of_plates_under_pressure_vibrates_as_each_plate_between_pressur
 @pytest.mark.parametrize("swapped", [False, True])
 def test_rods_pressed_end_to_end_between_pins_slide_past_each_other(options, swapped):
     """Turning both by t lengthens the distance L of the pins to L / cos(t): ``w^2 = P L / inertia``, and no buckling."""
-    rods = []
-    for name, x, n in (("ONE", 0.0, 4), ("TWO", 0.5, 3)):
-        rod = block((0.5, 0.1), (10, n), "quad8", (x, -0.05), name=name)
-        rods.append(fc.generate.renamed(rod, lambda own, name=name: own if own == name else f"{name} {own}"))
-    mesh = union(*rods)
+    one, two = (
+        block((0.5, 0.1), (10, n), "quad8", (x, -0.05), name=name) for name, x, n in (("ONE", 0.0, 4), ("TWO", 0.5, 3))
+    )
+    mesh = united(**{"ONE ": one, "TWO ": two})
     pins = {
         name: [int(np.linalg.norm(mesh.points - [x, 0.0], axis=1).argmin())] for name, x in (("A", 0.0), ("B", 1.0))
     }
@@ -375,8 +358,7 @@ def test_a_pipe_in_a_trough_is_a_pendulum_that_turns_freely():
 
 def test_contact_forces_on_a_driven_obstacle_move_with_both():
     """The contact stiffness does not resist a translation of body and obstacle."""
-    model = model_of(block((2.0, 1.0), (20, 10), origin=(-1.0, -1.0)), "plane_strain")
-    model.fix("BOTTOM", "xy")
+    model = model_of(block((2.0, 1.0), (20, 10), origin=(-1.0, -1.0)), "plane_strain", BOTTOM="xy")
     ball = fc.obstacles.Sphere((0.1, 3.0), 3.0)
     model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -0.01})
     step = fc.solve(model, 1)[-1]
@@ -391,8 +373,7 @@ def test_a_column_beyond_its_buckling_load_is_unstable():
     """With 102 % of the Euler load the lowest eigenvalue is negative, with 98 % it is positive."""
     stable, unstable = [], "1 of 2 modes are unstable: omega^2 < 0"
     for share in (0.98, 1.02):
-        model = model_of(block((50.0, 1.0), (20, 2), "quad8"), "plane_stress")
-        model.fix("LEFT", "xy")
+        model = model_of(block((50.0, 1.0), (20, 2), "quad8"), "plane_stress", LEFT="xy")
         model.add_traction("RIGHT", x=-share * np.pi**2 / 12.0 / (4.0 * 50.0**2))
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
@@ -410,8 +391,7 @@ def test_what_is_open_is_free_and_penalties_are_springs():
 
     mesh = union(bar("quad8", "plane_strain", (1, 8), "LOW"), bar("quad8", "plane_strain", (1, 8), "UP", 1.0))
     for options in FORMULATIONS:
-        model = model_of(mesh, "plane_strain")
-        supported(model, **{"LOW BOTTOM": "xy"}, LOW={"x": 0.0}, UP={"x": 0.0})
+        model = model_of(mesh, "plane_strain", **{"LOW BOTTOM": "xy"}, LOW={"x": 0.0}, UP={"x": 0.0})
         model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", penalty=1.5, **options)
         model.add_pressure("UP TOP", 1e-3)
         (step,) = fc.solve(model, 1)
@@ -425,8 +405,7 @@ def test_what_is_open_is_free_and_penalties_are_springs():
 
 def test_an_obstacle_holds_what_is_closed_and_moves_without_mass():
     for force in (None, {"y": -0.01}):
-        model = model_of(bar("quad8", "plane_strain"), "plane_strain")
-        supported(model, **{"BAR BOTTOM": "xy"}, BAR={"x": 0.0})
+        model = model_of(bar("quad8", "plane_strain"), "plane_strain", **{"BAR BOTTOM": "xy"}, BAR={"x": 0.0})
         plate = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
         model.add_obstacle(
             "plate", secondary="BAR TOP", obstacle=plate, motion=None if force else {"y": -0.01}, force=force
@@ -450,22 +429,16 @@ def test_sides_that_repeat_each_other_at_a_corner_hold_once():
     """A block tied to both walls of a corner, whose node is in both pairs."""
     walls = [block((1.0, 1.0), (3, 3), origin=o, name=n) for n, o in (("FLOOR", (1.0, -1.0)), ("WALL", (0.0, 0.0)))]
     parts = [*walls, block((1.0, 1.0), (3, 3), origin=(1.0, 0.0), name="BODY")]
-    named = [
-        fc.generate.renamed(part, lambda own, name=name: own if own == name else f"{name} {own}")
-        for part, name in zip(parts, ("FLOOR", "WALL", "BODY"))
-    ]
-    model = model_of(union(*named), "plane_strain")
-    supported(model, FLOOR="xy", WALL="xy")
+    mesh = united(**dict(zip(("FLOOR ", "WALL ", "BODY "), parts)))
+    model = model_of(mesh, "plane_strain", FLOOR="xy", WALL="xy")
     found = model.add_contacts(kind="tied")
     assert len(found) >= 2
-    alone = model_of(parts[2], "plane_strain")
-    supported(alone, BOTTOM="xy", LEFT="xy")
+    alone = model_of(parts[2], "plane_strain", BOTTOM="xy", LEFT="xy")
     assert fc.modes(model, n=3).frequencies == pytest.approx(fc.modes(alone, n=3).frequencies, rel=1e-9)
 
 
 def test_modes_are_steps_for_pictures_and_files(tmp_path):
-    model = model_of(block((1.0, 0.1), (10, 1), "quad8"), "plane_stress")
-    model.fix("LEFT", "xy")
+    model = model_of(block((1.0, 0.1), (10, 1), "quad8"), "plane_stress", LEFT="xy")
     found = fc.modes(model, n=3)
     assert len(found) == 3
     assert "0.016" in repr(found)
@@ -497,8 +470,7 @@ def test_a_case_file_asks_for_modes(tmp_path, capsys):
 
 def pressed_column(divisions):
     """A column under more than Euler's load, and its step."""
-    model = model_of(block((1.0, 0.1), divisions), "plane_stress")
-    model.fix("LEFT", "xy")
+    model = model_of(block((1.0, 0.1), divisions), "plane_stress", LEFT="xy")
     model.add_traction("RIGHT", x=-0.01)
     return model, fc.solve(model, 1)[0]
 

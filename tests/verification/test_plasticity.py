@@ -137,9 +137,8 @@ def test_an_indentation_past_yield(formulation: str, friction: float | None) -> 
 @pytest.mark.filterwarnings("ignore::fastcontact.errors.FastcontactWarning")
 def test_unloading_is_elastic_and_leaves_a_dent() -> None:
     mesh = fc.generate.block((2.0, 2.0), (12, 12))
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (1.0, 2.0)]))
-    model.fix("BOTTOM", "y")
+    law = fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (1.0, 2.0)])
+    model = made_of(mesh, "axisymmetric", law, BOTTOM="y")
     model.add_obstacle(
         "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 3.0), 1.0), motion={"y": -0.05},
         ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)],

@@ -1,10 +1,8 @@
 """Press fits by a negative clearance compared with Lame: only the discretisation error remains."""
 
-import warnings
-
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model, made_of, supported, united
 from two_bodies import rings
 
 import fastcontact as fc
@@ -90,11 +88,7 @@ def tubes(element, n, along):
     """Shaft and hub as tubes of unit length; `along` divisions of the shaft, three of the hub."""
     shaft = fc.generate.block((1.0, 1.0), (n, along), element, (1.0, 0.0), name="SHAFT")
     hub = fc.generate.block((1.0, 1.0), (n, 3), element, (2.0, 0.0), name="HUB")
-    named = [
-        fc.generate.renamed(m, {g: f"{p}_{g}" for g in ("LEFT", "RIGHT", "TOP", "BOTTOM")})
-        for m, p in ((shaft, "SHAFT"), (hub, "HUB"))
-    ]  # fmt: skip
-    model = made_of(fc.generate.union(*named), "axisymmetric", {"SHAFT": SHAFT, "HUB": HUB})
+    model = made_of(united(SHAFT_=shaft, HUB_=hub), "axisymmetric", {"SHAFT": SHAFT, "HUB": HUB})
     for part in ("SHAFT", "HUB"):
         supported(model, **{f"{part}_TOP": "y", f"{part}_BOTTOM": "y"})
     return model
@@ -143,6 +137,7 @@ def test_nodes_opposite_nodes_settle_on_one_facet():
 @pytest.mark.parametrize("around", [(10, 10), (6, 10), (10, 4), (9, 12)])
 @pytest.mark.parametrize("element", ["tri3", "quad4", "quad8"])
 @pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 def test_fits_settle_with_the_hollow_side_secondary(element, around, multipliers, friction):
     """The sides overlap by the interference: opposite a hollow corner the closest facet leaps as the rings move."""
     mesh = fc.generate.rings(
@@ -153,9 +148,7 @@ def test_fits_settle_with_the_hollow_side_secondary(element, around, multipliers
     model.add_contact(
         "fit", secondary="CONT_OUTER", primary="CONT_INNER", clearance=-0.05, multipliers=multipliers, friction=friction
     )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fc.FastcontactWarning)
-        steps = fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
+    steps = fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
     assert steps[-1].iterations["geometry_updates"] <= 12
 
 

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import made_of, supported, united
 
 import fastcontact as fc
 
@@ -27,8 +28,7 @@ def below_a_ball(formulation: str, divisions: int, law=None) -> tuple[float, lis
     mesh = fc.generate.block((1.0, 0.5), (divisions, divisions // 2), element="quad8")
     model = fc.Model(mesh, "axisymmetric", strain="finite")
     model.add_material(law or fc.ElasticPlastic(200e3, 0.3, yield_stress=300.0, hardening=[(0.0, 300.0), (0.2, 450.0)]))
-    model.fix("BOTTOM", "y")
-    model.fix("LEFT", "x")
+    supported(model, BOTTOM="y", LEFT="x")
     ball = fc.obstacles.Sphere((0.0, 2.5), 2.0)
     model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.04}, formulation=formulation)
     last, texts = told(model, 5)
@@ -59,10 +59,8 @@ def test_pressures_overshoot_at_the_edge_past_yield() -> None:
 def test_pressures_that_scatter_over_several_facets_are_accurate_or_told(element: str, formulation: str | None) -> None:
     """With quad8, mortar, facets of half the length and 16 steps, the largest pressure is 1391."""
     mesh = fc.generate.graded_block(element, width=6.0, contact_radius=0.6, contact_size=0.05)
-    model = fc.Model(mesh, "axisymmetric", strain="finite")
-    model.add_material(fc.ElasticPlastic(200e3, 0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (0.2, 600.0)]))
-    model.fix("BOTTOM", "xy")
-    model.fix("SYMMETRY_X", "x")
+    law = fc.ElasticPlastic(200e3, 0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (0.2, 600.0)])
+    model = made_of(mesh, "axisymmetric", law, strain="finite", BOTTOM="xy", SYMMETRY_X="x")
     ball, options = fc.obstacles.Sphere((0.0, 2.5), 2.5), {"formulation": formulation} if formulation else {}
     model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={"y": -0.05}, **options)
     last, texts = told(model, 8)
@@ -81,14 +79,8 @@ def dome_on_block(divisions: int, exchanged: bool, **options) -> fc.Model:
     x, y, z = dome.points.T
     rise = 0.3 * ((x - 1.0) ** 2 + (y - 1.0) ** 2) * (1.6 - z) / 0.6
     dome = dome.replace(points=np.column_stack([x, y, z + rise]))
-    block, dome = (
-        fc.generate.renamed(mesh, {side: f"{name}_{side}" for side in ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX")})
-        for mesh, name in ((block, "A"), (dome, "B"))
-    )
-    model = fc.Model(fc.generate.union(block, dome), "3d", strain="finite")
-    model.add_material(fc.ElasticPlastic(200e3, 0.3, yield_stress=300.0, hardening=[(0.0, 300.0), (0.1, 400.0)]))
-    model.fix("A_ZMIN", "xyz")
-    model.fix("B_ZMAX", "xy")
+    law = fc.ElasticPlastic(200e3, 0.3, yield_stress=300.0, hardening=[(0.0, 300.0), (0.1, 400.0)])
+    model = made_of(united(A_=block, B_=dome), "3d", law, strain="finite", A_ZMIN="xyz", B_ZMAX="xy")
     model.prescribe("B_ZMAX", z=-0.05)
     sides = ("A_ZMAX", "B_ZMIN") if exchanged else ("B_ZMIN", "A_ZMAX")
     model.add_contact("joint", secondary=sides[0], primary=sides[1], **options)
@@ -138,8 +130,7 @@ def test_a_press_fit_past_yield(element: str, strain: str, bound: float, exchang
     model = fc.Model(mesh, "plane_strain", strain=strain)
     model.add_material(fc.LinearElastic(E, nu) if strain == "small" else fc.NeoHookean(E=E, nu=nu), "INNER")
     model.add_material(fc.ElasticPlastic(E, nu, yield_stress=200.0), "OUTER")
-    model.fix("SYMMETRY_Y", "y")
-    model.fix("SYMMETRY_X", "x")
+    supported(model, SYMMETRY_Y="y", SYMMETRY_X="x")
     sides = ("CONT_OUTER", "CONT_INNER") if exchanged else ("CONT_INNER", "CONT_OUTER")
     interference = {"clearance": -bore - shaft, "clearance_ramp": [(0.0, 0.0), (1.0, 1.0)]}
     model.add_contact("fit", secondary=sides[0], primary=sides[1], **interference)

@@ -91,9 +91,8 @@ def test_no_word_where_nothing_locks(name):
 )  # fmt: skip
 def test_thin_parts_bend_right_or_it_is_told(name, n, modes, told):
     """Deflection of a cantilever by its end load, of Bernoulli's theory F L^3 / 3 E I."""
-    model = fc.Model(fc.generate.box((1.0, 0.1, 0.02), n, name), "3d")
-    model.add_material(fc.LinearElastic(E=1e6, nu=0.3, incompatible_modes=modes))
-    model.fix("XMIN", "xyz")
+    law = fc.LinearElastic(E=1e6, nu=0.3, incompatible_modes=modes)
+    model = made_of(fc.generate.box((1.0, 0.1, 0.02), n, name), "3d", law, XMIN="xyz")
     model.add_traction("XMAX", z=0.1)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

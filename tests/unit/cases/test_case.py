@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from case_texts import HERTZ, UNITS, case_of, contact_pair, spheres
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
@@ -41,8 +42,7 @@ def test_a_file_of_another_size_than_cases_have_is_not_parsed(tmp_path):
     path = tmp_path / "huge.toml"
     with open(path, "wb") as file:
         file.truncate(1 << 40)  # takes no room
-    with pytest.raises(fc.CaseError, match=r"larger than \d+ MB: put its mesh into a separate file"):
-        read_case(path)
+    refused(fc.CaseError, r"larger than \d+ MB: put its mesh into a separate file", read_case, path)
 
 
 @pytest.mark.parametrize(
@@ -293,5 +293,4 @@ def test_what_has_none_says_why(folder, capsys):
     ],
 )
 def test_what_is_refused_before_numerics(folder, asked, message):
-    with pytest.raises(fc.FastcontactError, match=message):
-        read_case(written(folder, asked))
+    refused(fc.FastcontactError, message, read_case, written(folder, asked))

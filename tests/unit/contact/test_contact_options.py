@@ -4,6 +4,7 @@ import tomllib
 
 import pytest
 from case_texts import case_of, contact_pair
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
@@ -36,8 +37,7 @@ def solved(case):
     ('kind = "glue"', "kind of contact 'pair' 'glue'.*bilateral.*tied"),
 ])  # fmt: skip
 def test_wrong_options_are_named(options, words):
-    with pytest.raises(fc.FastcontactError, match=words):
-        case_with(options)
+    refused(fc.FastcontactError, words, case_with, options)
 
 
 def test_a_ramp_must_cover_the_analysis():
@@ -50,8 +50,7 @@ def test_a_clearance_that_fails_is_named():
     case = case_with("")
     case.model.contact.clear()
     case.model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", clearance=lambda x: x[:3, 0])
-    with pytest.raises(fc.ModelError, match="clearance of contact 'pair' is a function that returned"):
-        solved(case)
+    refused(fc.ModelError, "clearance of contact 'pair' is a function that returned", solved, case)
 
 
 def test_the_summary_tells_the_penetration(tmp_path):

@@ -210,6 +210,7 @@ def test_an_obstacle_has_no_facets_to_smooth():
 
 
 @pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 def test_facets_that_interlock_where_nodes_coincide_are_told(smooth):
     """A shaft turns in a hub whose nodes coincide with its own: facets inclined like the teeth of a ratchet hold it."""
     mesh, axes = fc.generate.rings("quad4", divisions_inner=(2, 8), divisions_outer=(2, 8)), fc.CylindricalAxes()
@@ -221,7 +222,5 @@ def test_facets_that_interlock_where_nodes_coincide_are_told(smooth):
         "fit", secondary="CONT_OUTER", primary="CONT_INNER", friction=0.15, clearance=-0.1,
         formulation="node_to_segment", surface_smoothing=smooth,
     )  # fmt: skip
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        last = fc.solve(model, [1.0, 2.0])[-1]
+    last = fc.solve(model, [1.0, 2.0])[-1]
     assert any("inclined to the smooth surface" in text for text in last.warnings) != smooth

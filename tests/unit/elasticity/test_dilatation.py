@@ -124,8 +124,7 @@ def test_patch_test_through_the_solver(name, linear_solver):
     kinematics = "plane_strain" if mesh.dim == 2 else "3d"
     slope = np.array([[1.0, 0.4, -0.3], [-0.2, -2.0, 0.7], [0.5, 0.1, 1.2]])[: mesh.dim, : mesh.dim] * 1e-3
     outer = np.unique(np.concatenate([f.ravel() for f in fc.topology.outer_facets(mesh).values()]))
-    model = fc.Model(mesh.with_groups(points={"OUTER": outer}), kinematics)
-    model.add_material(RUBBER)
+    model = made_of(mesh.with_groups(points={"OUTER": outer}), kinematics, RUBBER)
     model.prescribe("OUTER", **{axis: lambda x, row=row: x @ row for axis, row in zip("xyz", slope)})
     (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver=linear_solver, linear_tolerance=1e-13)
     assert np.abs(step.displacement - mesh.points @ slope.T).max() < 1e-8 * 1e-3

@@ -217,11 +217,8 @@ def test_nodal_forces_of_a_graded_body_balance_its_stress(options):
 def test_heat_that_expands_alike_leaves_a_graded_body_without_stress(kinematics):
     """Expansion that varies against the temperature: their product, the strain, is the same everywhere."""
     mesh = space("hex8") if kinematics == "3d" else fc.generate.block((2.0, 1.0), (6, 3), "quad8")
-    model = fc.Model(mesh, kinematics)
-    model.add_material(
-        fc.LinearElastic(E=lambda x: 1000.0 * (1.0 + x[:, 0]), nu=0.3, expansion=lambda x: 1e-5 + 0 * x[:, 0])
-    )
-    model.fix("BOTTOM", "y")
+    law = fc.LinearElastic(E=lambda x: 1000.0 * (1.0 + x[:, 0]), nu=0.3, expansion=lambda x: 1e-5 + 0 * x[:, 0])
+    model = made_of(mesh, kinematics, law, BOTTOM="y")
     if kinematics != "axisymmetric":
         model.fix("LEFT", "x")
     if kinematics == "3d":

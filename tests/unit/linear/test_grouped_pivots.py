@@ -5,6 +5,7 @@ import pressed_blocks
 import pytest
 from pairwise import first_of
 from pressed_blocks import solved
+from refusals import refused
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
@@ -298,8 +299,7 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
     force = solved(model, "direct")[1].contact["c"].force
     assert step.contact["c"].force == pytest.approx(force, abs=1e-9)
     monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})
-    with pytest.raises(TooManyColumnsError, match="direct solver"):
-        solved(model, "amg")
+    refused(TooManyColumnsError, "direct solver", solved, model, "amg")
 
 
 def test_auto_knows_which_constraints_multigrid_cannot_eliminate():
@@ -317,8 +317,7 @@ def test_a_full_compliance_that_would_take_hours_is_refused_with_the_alternative
     monkeypatch.setattr("fastcontact.linear.delassus.MOST_ROWS", 100)
     monkeypatch.setattr("fastcontact.analysis.friction.solve.MOST_ROWS_WITH_FRICTION", 100)
     expected = r"full compliance of \d+ constraints, .*GB .*formulation=\"mortar\" with multipliers=\"dual\""
-    with pytest.raises(fc.ContactError, match=expected):
-        solved(model, solver)
+    refused(fc.ContactError, expected, solved, model, solver)
 
 
 def test_one_layer_is_a_diagonal():

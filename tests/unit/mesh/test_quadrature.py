@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -154,8 +155,7 @@ def test_the_first_inverted_cell_is_named_with_place_and_count():
 def test_a_flat_cell_is_degenerate(height):
     mesh = one("tri3", [[0, 0], [1, 0], [0.5, height]])
     assert quality(mesh).n_bad == 1
-    with pytest.raises(fc.MeshError, match=r"cell 0 .* is degenerate \(number of such cells: 1\)"):
-        check_cells(mesh)
+    refused(fc.MeshError, r"cell 0 .* is degenerate \(number of such cells: 1\)", check_cells, mesh)
 
 
 def test_a_cell_with_all_nodes_in_one_place_is_degenerate_and_does_not_warn():
@@ -174,8 +174,7 @@ def test_a_folded_quadratic_cell_is_inverted_though_its_corners_are_fine():
     nodes[3] = [0.5, 0.6]
     mesh = one("tri6", nodes)
     assert quality(mesh).n_bad == 1
-    with pytest.raises(fc.MeshError, match="inverted"):
-        check_cells(mesh)
+    refused(fc.MeshError, "inverted", check_cells, mesh)
 
 
 def test_a_mesh_without_solid_cells_has_no_figures():

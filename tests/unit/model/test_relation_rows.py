@@ -32,8 +32,8 @@ def block(dim, element=None):
     return body_of(element or ("quad4" if dim == 2 else "hex8"), (2.0, 3.0, 1.0), (2, 3, 1))
 
 
-def model_of(mesh):
-    return elastic_model(mesh, E=E, nu=NU)
+def model_of(mesh, **held):
+    return elastic_model(mesh, E=E, nu=NU, **held)
 
 
 def last(model, **options):
@@ -101,8 +101,7 @@ def test_a_smooth_mandrel_holds_a_ring_and_lame_tells_the_pressure():
         square = fc.generate.block((1.0, 1.0), (n, n // 2), "quad8")
         angle, radius = 0.5 * np.pi * (1 - square.points[:, 0]), 1.0 + square.points[:, 1]
         mesh = square.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
-        model = model_of(mesh)
-        supported(model, BOTTOM="normal", LEFT="x", RIGHT="y")
+        model = model_of(mesh, BOTTOM="normal", LEFT="x", RIGHT="y")
         model.add_pressure("TOP", 2.0)
         step = last(model)
         inside = mesh.points_of("BOTTOM")
@@ -174,8 +173,7 @@ def test_groups_are_related_along_their_normals():
 
 
 def test_a_support_that_contradicts_a_normal_one_is_told():
-    model = model_of(block(2))
-    supported(model, LEFT="x", BOTTOM="y")
+    model = model_of(block(2), LEFT="x", BOTTOM="y")
     model.prescribe("BOTTOM", normal=0.1)
     refused(fc.ModelError, "the displacement normal prescribed on 'BOTTOM' contradicts the supports", last, model)
 

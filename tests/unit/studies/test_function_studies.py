@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres, supported
+from models import elastic_model, pressed_spheres, united
 from pairwise import first_of
 from refusals import refused
 
@@ -68,13 +68,12 @@ def test_a_theory_of_a_function_separates_its_error_from_that_of_the_mesh():
 def test_the_force_of_a_press_fit_is_that_all_round():
     def fit(size):
         n = round(1 / size)
-        rings = [
-            fc.generate.block((1.0, 1.0), (n, n), "quad8", (r, 0.0), name=name) for r, name in ((1, "IN"), (2, "OUT"))
-        ]
-        named = [fc.generate.renamed(m, lambda g, n=m.group_names[0]: g if g == n else f"{n} {g}") for m in rings]
-        model = elastic_model(fc.generate.union(*named), "axisymmetric", E=E, nu=NU)
-        supported(model, **{"IN BOTTOM": "y", "OUT BOTTOM": "y"})
-        model.add_contact("fit", secondary="IN RIGHT", primary="OUT LEFT", clearance=-1e-4)
+        rings = {
+            name: fc.generate.block((1.0, 1.0), (n, n), "quad8", (r, 0.0), name=name[:-1])
+            for r, name in ((1, "IN_"), (2, "OUT_"))
+        }
+        model = elastic_model(united(**rings), "axisymmetric", E=E, nu=NU, IN_BOTTOM="y", OUT_BOTTOM="y")
+        model.add_contact("fit", secondary="IN_RIGHT", primary="OUT_LEFT", clearance=-1e-4)
         return fc.solve(model, 1)
 
     study = fc.convergence_study(fit, [0.5, 0.25], quantities={"around": lambda step: step.contact["fit"].normal_force})

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from deck_text import deck_of
+from refusals import refused
 
 import fastcontact as fc
 
@@ -195,8 +196,7 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
 def test_what_is_refused(tmp_path, old, new, said):
     text = two_bars() + MATERIALS + CONTACT + ENDS + STEP.format("")
     assert text.count(old) == 1, text
-    with pytest.raises(fc.CaseError, match=said):
-        deck_of(tmp_path, text.replace(old, new))
+    refused(fc.CaseError, said, deck_of, tmp_path, text.replace(old, new))
 
 
 RESISTANCE = LENGTH / 50.0 + 1e-3 + LENGTH / 20.0
@@ -241,5 +241,4 @@ def test_two_films_on_a_face_and_heat_that_nothing_holds_are_refused(tmp_path):
         deck_of(tmp_path, head + ENDS + STEP.format("*FILM\n5, F2, 20., 2.\n*FILM\n5, F2, 20., 3.\n"))
     gone = ENDS + STEP.format("") + STEP.format("*BOUNDARY, OP=NEW\n")
     deck = deck_of(tmp_path, head + gone)
-    with pytest.raises(fc.ModelError, match="in the load steps after 1: nothing determines the temperature of body"):
-        deck.solve()
+    refused(fc.ModelError, "in the load steps after 1: nothing determines the temperature of body", deck.solve)
