@@ -134,9 +134,8 @@ def _end_of_step(
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and end.rigid is not None:
-        iterations["regularised"] = problem.floating_bodies.report(
-            end.rigid, max(end.largest_rigid_force, end.largest_force)
-        )
+        scale = end.largest_rigid_force  # may be round-off beside contact forces, which are round-off without loads
+        iterations["regularised"] = problem.floating_bodies.report(end.rigid, scale and max(scale, end.largest_force))
         if settled is not None:
             forces = settled.constraints, settled.solution.multiplier
             free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force, balance.residual)
