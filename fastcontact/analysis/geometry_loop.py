@@ -317,6 +317,7 @@ class _Mixing:
             return None
         start, step, slope, fraction = self._line
         end_slope = float(step @ (image - before))
+        # A minimum along the step lies between its start and its end. The secant of the slopes is limited for large ones.
         if end_slope >= -0.5 * slope or fraction <= 2.0**-HALVINGS:
             return None
         fraction *= min(max(slope / (slope - end_slope), 0.1), 0.5)

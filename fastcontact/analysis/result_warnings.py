@@ -46,13 +46,13 @@ from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Ratio above which a warning is given. It applies to
+# Ratio, or excess of a ratio over one, above which a warning is given. It applies to
 # - the frictional work of nodes in the steps in which they close, relative to the total frictional work;
 # - the work of the stresses on strains that linear kinematics neglect, relative to that on strains;
 # - strains, because the fraction of a strain that linear kinematics neglect is about as large as the strain;
 # - the wear depth, relative to the size of the model;
-# - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield.
-# Facets whose lengths differ by less than this fraction count as equally large.
+# - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield;
+# - the length of the facets of one side, relative to that of the other side.
 NEGLECTED = 0.1
 # Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
 # bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.

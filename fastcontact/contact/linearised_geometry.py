@@ -210,8 +210,7 @@ class _SurfacePoints:
         self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
 
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, feet: Places) -> Array:
-        """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
-        self._dual_axes = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
+        """Return the derivatives (n, dim - 1, dim) of facet normals along facets."""
         if primary.order == 1 and xi.shape[1] == 1:
             return np.zeros_like(self.axes)  # straight lines
         # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
@@ -220,6 +219,11 @@ class _SurfacePoints:
         second = np.stack(above, axis=3) - np.stack(below, axis=3)
         curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[feet.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
+
+    @cached_property
+    def _dual_axes(self) -> Array:
+        """Dual vectors (n, dim - 1, dim) of the tangent vectors `axes` [1 / length]."""
+        return np.asarray(np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes))
 
     def _slopes(self, values: Array) -> Array:
         """Return the derivatives (n, dim - 1, dim) of a nodal field (n_points, dim) along facets at the facing points."""
@@ -252,7 +256,7 @@ class _SurfacePoints:
         with the dual axes :math:`y^{,\alpha}`, up to products of gap and curvature (Laursen, 2002, section 5.3).
         """
         n_dofs, gap, axes = self.motion.shape[1] * self.normal.shape[1], self._gap[:, 0], range(self.axes.shape[1])
-        dual = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
+        dual = self._dual_axes
         metric, bend = np.einsum("nid,njd->nij", dual, dual), np.einsum("nid,njd->nij", self._bend, self.axes)
         slopes = self._at.gradient[..., None] * self.normal[:, None, None]
         tilts = [nodal_rows(self._at.nodes, slopes[:, :, i], n_dofs) for i in axes]
