@@ -1,6 +1,7 @@
 """Modes: bars, beams, plates and rings of textbooks; bodies joined by contact as one body; closed forms with preload."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ from scipy.sparse import csr_array
 import fastcontact as fc
 from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
 from fastcontact.cli import main
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.held_motions import HeldMotions
+from fastcontact.contact.linearised_geometry import faced
+from fastcontact.contact.pairing import Candidates
 from fastcontact.mesh import elements
 
 pytestmark = pytest.mark.each_value
@@ -354,6 +358,31 @@ def test_a_pipe_in_a_trough_is_a_pendulum_that_turns_freely():
         model.add_obstacle("floor", secondary="TOP", obstacle=floor)
     found = fc.modes(loose, fc.solve(held, 1)[-1], 2).eigenvalues
     assert found == pytest.approx([0.0, g / (R - 1.0)], abs=0.03 * g)
+
+
+@pytest.mark.parametrize("sides", [("CONT_BLOCK", "CONT_SPHERE"), ("CONT_SPHERE", "CONT_BLOCK")])
+@pytest.mark.parametrize("element", ["hex8", "hex20", "tet4"])
+def test_contact_stiffness_in_space_is_minus_the_second_difference_of_gaps(element, sides):
+    mesh = fc.generate.sphere_on_block("tet4" if element == "tet4" else "hex8", R=1.0, size=0.2, contact_size=0.1)
+    mesh = fc.generate.to_quadratic(mesh) if element == "hex20" else mesh
+    model = model_of(mesh, "3d")
+    model.add_contact("c", secondary=sides[0], primary=sides[1], formulation="continuous", normals="facet")
+    pair = model.bind(model.contact[0], HeldMotions.of(model.prescribed_by_ramp()[0], csr_array((0, model.n_dofs))))
+    config = Configuration.undeformed(mesh.points)
+    candidates = Candidates.inside(pair.secondary, [np.array([[0.2, 0.3]]) for _ in pair.secondary.blocks])
+    near = np.linalg.norm(candidates.positions(mesh.points), axis=1) < 0.15  # products of gap and curvature are omitted
+    rows = np.flatnonzero(near & pair.facing(candidates, config).paired)
+    rng = np.random.default_rng(0)
+    du, force = 1e-4 * rng.normal(size=mesh.points.shape), 1.0 + rng.random(len(rows))
+
+    def faced_at(u):
+        pairing = pair.facing(candidates, replace(config, displacement=u))
+        return faced(candidates, pairing, rows, pair.primary, mesh.points + u, "facet", config.pose)
+
+    points = [faced_at(factor * du) for factor in (-1.0, 0.0, 1.0)]
+    before, at_rest, after = (force @ np.einsum("nd,nd->n", p.apart, p.normal) for p in points)
+    second_difference = before - 2.0 * at_rest + after
+    assert du.ravel() @ points[1].stiffness(force) @ du.ravel() == pytest.approx(-second_difference, rel=2e-4)
 
 
 def test_contact_forces_on_a_driven_obstacle_move_with_both():
