@@ -28,7 +28,7 @@ from fastcontact.analysis.friction_increments import FrictionIncrements
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
-from fastcontact.analysis.tolerances import ScatterWindow, Tolerances
+from fastcontact.analysis.tolerances import RESIDUAL, ScatterWindow, Tolerances
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
@@ -120,7 +120,10 @@ def _settle(
     limit = criteria.max_geometry_updates if limit is None else limit
     # From a converged iterate, the loop continues without extrapolation and with accurate solutions.
     extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
-    tolerances = Tolerances(problem.solver, criteria, extrapolates, step.state.gap_round_off, step.expected)
+    first_residual = 0.0
+    if extrapolates:
+        first_residual = RESIDUAL * NOTABLE if step.state.extrapolation.ratio else NOTABLE
+    tolerances = Tolerances(problem.solver, criteria, first_residual, step.state.gap_round_off, step.expected)
     mixing, window = _Mixing(step), ScatterWindow()
     if extrapolates:
         iterate.u = step.state.extrapolation.predicted(iterate.u, degree=1)

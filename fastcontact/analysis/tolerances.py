@@ -16,7 +16,7 @@ from collections import deque
 
 import numpy as np
 
-from fastcontact.analysis.criteria import NOTABLE, Criteria
+from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.arrays import Array, largest
 from fastcontact.linear.protocol import LinearSolver
@@ -24,7 +24,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Forcing term of iterative solutions: ratio of the relative residual to the last relative change of the displacements, or
 # to the last relative residual if that is smaller. More accurate solutions would not help, because the error of contact
-# detection is as large as this change. The relative residual of the first solution of a step is NOTABLE.
+# detection is as large as this change. The relative residual of the first solution of a step is NOTABLE, or this fraction
+# of it in a step that is extrapolated from earlier ones.
 RESIDUAL = 0.03
 # If the residual of the friction law determines the tolerance, the tolerance decreases at least by this factor, because
 # the residual of the law may not decrease if linear solutions are inaccurate.
@@ -43,8 +44,8 @@ class Tolerances:
     ----------
     solver : LinearSolver
     criteria : Criteria
-    begin_inexact : bool
-        Whether the tolerance of the first solutions is larger than that of the last one.
+    first : float
+        Largest relative residual of the first solution, unless the tolerance of the solver is larger [-].
     round_off : float
         Bound of the round-off of gaps [length].
     expected : float
@@ -52,10 +53,10 @@ class Tolerances:
     """
 
     def __init__(
-        self, solver: LinearSolver, criteria: Criteria, begin_inexact: bool, round_off: float, expected: float
+        self, solver: LinearSolver, criteria: Criteria, first: float, round_off: float, expected: float
     ) -> None:
         self._solver, self._criteria, self._round_off, self._expected = solver, criteria, round_off, expected
-        self._residual = max(solver.tolerance, NOTABLE) if begin_inexact else solver.tolerance
+        self._residual = max(solver.tolerance, first)
 
     @property
     def inexact(self) -> bool:

@@ -20,7 +20,7 @@ from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
 # Ratio of the reduced tolerance to the tolerance at which the residual is expected to reach its bound.
-REDUCTION = 0.1
+REDUCTION = 0.3
 
 
 class LoadedIteration(Loaded):
