@@ -351,7 +351,10 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"the largest rotation is {angle:.3f} rad, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
-    elif angle > 0.5 * OUT_OF_BALANCE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
+        return
+    friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
+    # Rotations of preloaded bodies matter however small they are.
+    if angle > 0.5 * OUT_OF_BALANCE * friction or (_ratio(*_work_on_strains(problem, last, True)) > NEGLECTED).any():
         yield from _neglected_rotation(problem, last, angle)
 
 
@@ -587,8 +590,7 @@ def _neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Ite
     """Yield a warning for the body in which linear kinematics neglect most; `angle` is the largest rotation [radian]."""
     mesh = problem.model.mesh
     neglected, work_by_body = _work_on_strains(problem, last)
-    # Bodies whose work on strains is round-off of that of other bodies are free of stress.
-    ratio = np.abs(neglected) / np.maximum(work_by_body, max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY))
+    ratio = _ratio(neglected, work_by_body)
     worst = int(np.argmax(ratio))
     if ratio[worst] > NEGLECTED:
         name = body_name(mesh, bodies(mesh)[1], worst)
@@ -637,14 +639,25 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
     return capacity
 
 
-def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
-    """Return the work of the stresses on neglected strains, and its absolute value on strains, both (n_bodies,) [energy]."""
+def _ratio(neglected: Array, work_by_body: Array) -> Array:
+    """Return the ratio (n_bodies,) of the results of `_work_on_strains` [-]."""
+    # Bodies whose work on strains is round-off of that of other bodies are free of stress.
+    return np.abs(neglected) / np.maximum(work_by_body, max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY))
+
+
+def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = False) -> tuple[Array, Array]:
+    """Return the work of the stresses on neglected strains, and its absolute value on strains, both (n_bodies,) [energy].
+
+    With `at_centres`, strains at the centres of cells are used, which is faster and underestimates those of bending.
+    """
     mesh, axisymmetric = problem.model.mesh, problem.model.kinematics == "axisymmetric"
     count, body = bodies(mesh)
     neglected, work_by_body = np.zeros((2, count))
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, weights = element.quadrature
+        if at_centres:
+            xi, weights = element.nodes[: element.n_corners].mean(axis=0)[None], np.array([weights.sum()])
         N, dN = element.shape(xi), element.gradient(xi)
         for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
             slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)

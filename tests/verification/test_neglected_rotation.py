@@ -125,3 +125,31 @@ def test_a_block_that_slides_far_needs_no_finite_strains():
     last = fc.solve(model, [1.0, 1.5, 2.0])[-1]
     assert last.contact["c"].shear.any()
     assert not [text for text in last.warnings if "moments of friction" in text]
+
+
+@pytest.mark.filterwarnings("ignore:rotations of up to")
+def test_leaves_that_are_pressed_together_before_they_bend():
+    """Small strains count the geometric stiffness of the pressure nearly twice, also at rotations of 0.01."""
+
+    def bend(strain):
+        mesh = fc.generate.union(
+            *(
+                fc.generate.renamed(fc.generate.block((100.0, 2.0), (20, 1), "quad8", (0.0, y)), f"{name}_{{}}".format)
+                for name, y in (("LOWER", 0.0), ("UPPER", 2.0))
+            )
+        )
+        model = elastic_model(mesh, "plane_stress", E=200e3, strain=strain)
+        for name, side in (("LOWER", "BOTTOM"), ("UPPER", "TOP")):
+            model.fix(f"{name}_LEFT", "xy")
+            model.add_traction(f"{name}_RIGHT", y=-0.17, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+            model.add_pressure(f"{name}_{side}", 10.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
+        model.add_contact("c", secondary="UPPER_BOTTOM", primary="LOWER_TOP")
+        last = fc.solve(model, [1.0, 2.0])[-1]
+        return float(np.abs(last.displacement).max()), last.warnings
+
+    (small, warned), (exact, silent) = bend("small"), bend("finite")
+    assert not silent
+    assert small < 0.85 * exact
+    assert len(warned) == 1
+    stated = float(warned[0].split("would do ")[1].split("%")[0]) / 100.0
+    assert 0.5 * (exact / small - 1.0) < stated < 1.5 * (exact / small - 1.0)
