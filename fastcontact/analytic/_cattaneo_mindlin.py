@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastcontact.analytic._hertz_line import HertzLine, hertz_line
+from fastcontact.analytic._hertz_point import HertzPoint, hertz_point
 from fastcontact.analytic._inputs import array, not_negative, number, poisson, positive
-from fastcontact.analytic.hertz_line import HertzLine, hertz_line
-from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError, warn
 

@@ -7,13 +7,13 @@ of the order a/R, where a is the contact radius: at an approach of 8 % of R the 
 from __future__ import annotations
 
 import json
+import pkgutil
 from dataclasses import dataclass
-from importlib import resources
 
 import numpy as np
 
+from fastcontact.analytic._hertz_point import HertzPoint, hertz_point
 from fastcontact.analytic._inputs import number, positive
-from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -67,8 +67,7 @@ def _table() -> Array:
 
     Unknown values are NaN.
     """
-    text = resources.files("fastcontact.analytic").joinpath("finite_spheres.json").read_text(encoding="utf-8")
-    data = json.loads(text)
+    data = json.loads(pkgutil.get_data("fastcontact.analytic", "finite_spheres.json") or "{}")
     R, E = data["R"], data["E"]
     return np.array(data["rows"], dtype=np.float64) / np.array([R, E * R**2, E, R])
 

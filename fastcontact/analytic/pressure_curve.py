@@ -10,26 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._cattaneo_mindlin import CattaneoMindlinLine, CattaneoMindlinSphere
-from fastcontact.analytic._lame import PressFit
-from fastcontact.analytic._manufactured import HertzBox
-from fastcontact.analytic._persson import PerssonPin
-from fastcontact.analytic._punches import PowerLawPunch
-from fastcontact.analytic.hertz_line import HertzLine
-from fastcontact.analytic.hertz_point import HertzPoint
+from fastcontact import analytic
 from fastcontact.arrays import Array
 
-# Names of the theories, after their authors.
-NAMES: dict[type, str] = {
-    HertzPoint: "Hertz",
-    HertzLine: "Hertz",
-    HertzBox: "Hertz",
-    CattaneoMindlinLine: "Hertz",
-    CattaneoMindlinSphere: "Hertz",
-    PressFit: "Lamé",
-    PerssonPin: "Persson",
-    PowerLawPunch: "Sneddon",
+# Authors of the theories, by the name of the class.
+_AUTHORS = {
+    "HertzPoint": "Hertz",
+    "HertzLine": "Hertz",
+    "HertzBox": "Hertz",
+    "CattaneoMindlinLine": "Hertz",
+    "CattaneoMindlinSphere": "Hertz",
+    "PressFit": "Lamé",
+    "PerssonPin": "Persson",
+    "PowerLawPunch": "Sneddon",
 }
+
+
+def author(theory: Any) -> str:
+    """Return the name of a theory, which is that of its author."""
+    return _AUTHORS.get(type(theory).__name__, "theory")
 
 
 @dataclass(frozen=True)
@@ -67,11 +66,11 @@ def pressure_curve(theory: Any) -> PressureCurve | None:
     """
     if theory is None:
         return None
-    name = NAMES.get(type(theory), "theory")
-    if isinstance(theory, PressFit):
+    name = author(theory)
+    if isinstance(theory, analytic.PressFit):
         uniform = theory.pressure
         return PressureCurve(name, lambda s: np.full(np.shape(s), uniform), uniform, math.inf)
-    if isinstance(theory, PerssonPin):
+    if isinstance(theory, analytic.PerssonPin):
         pin = theory
         return PressureCurve(
             name,
@@ -79,7 +78,8 @@ def pressure_curve(theory: Any) -> PressureCurve | None:
             pin.pressure_max,
             pin.R * math.radians(pin.contact_angle),
         )
-    theory = theory.normal if isinstance(theory, (CattaneoMindlinLine, CattaneoMindlinSphere)) else theory
+    if isinstance(theory, (analytic.CattaneoMindlinLine, analytic.CattaneoMindlinSphere)):
+        theory = theory.normal
     if not all(hasattr(theory, key) for key in ("pressure", "pressure_max", "radius")):
         return None
     if not (callable(theory.pressure) and math.isfinite(theory.pressure_max)):

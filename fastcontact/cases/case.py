@@ -19,7 +19,6 @@ from fastcontact.cases.model_tables import LISTS, build_model, ramp_points
 from fastcontact.errors import CaseError, check_known, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.linear.protocol import TOLERANCE
-from fastcontact.mesh import generate
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.files.meshio_files import files_of
 from fastcontact.mesh.mesh import Mesh
@@ -364,10 +363,12 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
         return read_mesh(folder / data["file"], mesh_name=data.get("name"))
     if "generator" not in data:
         raise CaseError("'mesh' needs either the key 'file' or the key 'generator'")
+    from fastcontact.mesh.generate import GENERATORS
+
     name = data["generator"]
-    check_known("mesh.generator", name, generate.GENERATORS, CaseError)
+    check_known("mesh.generator", name, GENERATORS, CaseError)
     arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items() if key != "generator"}
-    return called("mesh", generate.GENERATORS[name], arguments)
+    return called("mesh", GENERATORS[name], arguments)
 
 
 def _ramp(data: dict[str, Any]) -> Ramp:

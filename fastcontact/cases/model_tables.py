@@ -7,11 +7,10 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from reprlib import repr
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastcontact._tools.argument_types import types_of
 from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables, toml_types
-from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -19,13 +18,13 @@ from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material,
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import OTHER_WORDS, CaseError, check_known, unknown
-from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
-from fastcontact.mesh.generate.cut import cut
-from fastcontact.mesh.generate.transform import with_reference_points
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
+
+if TYPE_CHECKING:
+    from fastcontact.contact.obstacles import Obstacle
 
 # Keys whose values may depend on the position.
 VALUES = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coefficient", "ambient", *COMPONENTS)
@@ -229,6 +228,8 @@ def _read_fields(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) ->
         check_keys(name, value, FIELD)
         if "field" not in value:
             raise CaseError(f"'{name}' needs 'field', the name of the field in the file")
+        from fastcontact.mesh.files.mesh_fields import read_field
+
         return read_field(mesh, groups=entry.get("groups"), **_resolve(folder, value))
 
     return _convert(where, entry, CONSTANTS, read)
@@ -273,6 +274,8 @@ def _cut_along(mesh: Mesh, sections: Any) -> Mesh:
     for i, entry in enumerate(tables("pretension", sections)):
         name = entry.get("section")
         if isinstance(name, str) and "opposite" not in entry and name + OPPOSITE not in mesh.group_names:
+            from fastcontact.mesh.generate.cut import cut
+
             with at(f"pretension[{i}]"):
                 mesh = cut(mesh, name, entry.get("normal"))
     return mesh
@@ -283,6 +286,8 @@ def _add_references(mesh: Mesh, couplings: Any) -> Mesh:
     for i, entry in enumerate(tables("coupling", couplings)):
         name, coordinates = entry.get("reference"), entry.get("place")
         if isinstance(name, str) and isinstance(coordinates, list):
+            from fastcontact.mesh.generate.transform import with_reference_points
+
             with at(f"coupling[{i}]"):
                 mesh = with_reference_points(mesh, {name: coordinates})
     return mesh
@@ -307,6 +312,8 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
 
 def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
     """Return the rigid shape that a table describes by its kind and its arguments; `mesh` is the mesh of the model."""
+    from fastcontact.contact.obstacles import SHAPES, MeshedSurface
+
     kind = shape.get("kind", "") if isinstance(shape, dict) else shape if isinstance(shape, str) else ""
     if kind not in (*SHAPES, "mesh"):
         raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))

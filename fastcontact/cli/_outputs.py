@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastcontact._tools.paths import PathLike
-from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
@@ -111,6 +110,8 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
 
     Raises FastcontactError if there is no contact pair.
     """
+    from fastcontact.cli._results import load_multiplier, pressure_curves
+
     if not step.contact:
         raise FastcontactError("there is no contact pair whose pressure could be plotted")
     name, contact = next(iter(step.contact.items()))

@@ -24,7 +24,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
 
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
@@ -572,7 +572,12 @@ class LinearisedPoints:
             rows, of_rows = self.place[0], gaps
             gaps = np.zeros((len(gaps), self.place[1]))
             gaps[:, rows] = of_rows
-        return self.points.motion.T @ self._at_points(force, tangential) + varied.motion.T @ self._force, gaps
+        return self._to_nodes @ self._at_points(force, tangential) + varied.motion.T @ self._force, gaps
+
+    @cached_property
+    def _to_nodes(self) -> csc_array:
+        """Map (n_points, n) from forces at the points to nodal forces."""
+        return self.points.motion.T
 
     def _at_points(self, normal: Array, tangential: Array) -> Array:
         """Return the forces (n, dim) at the points for normal and tangential forces (m, dim) of the constraints [force]."""

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.analytic._lame import PressFit
-from fastcontact.analytic._manufactured import HertzBox
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.cases.case import Case
@@ -23,8 +21,6 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.units import axis_label
 
-# Theories that are exact for the bodies of the model, unlike theories of half-spaces or beams.
-EXACT_THEORIES = (PressFit, HertzBox)
 # Title and kind of unit (empty for ratios) of the standard quantities.
 LABELS = {
     "force": ("contact force", "force"),

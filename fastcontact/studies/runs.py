@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact import analytic
 from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, build_case, read_case, stored_description
 from fastcontact.errors import CaseError, FastcontactError, check_known, unknown, warn
@@ -26,7 +27,7 @@ from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.fit import Limit, fit_limit
 from fastcontact.studies.job import Function, FunctionRun, Job, Measure, Quantities, fields_of, first_parameter, job_of
-from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, check_names, theory_quantities
+from fastcontact.studies.quantities import LABELS, check_names, theory_quantities
 from fastcontact.studies.report import report_fields
 from fastcontact.studies.series import Level, Point, Series, TheoryCurve, Value
 from fastcontact.studies.settings import (
@@ -232,9 +233,11 @@ def _series(
     failed = {number: str(result["error"]) for number, result in results if "error" in result}
     at_force, spread = _theory_at_force(*theory[:2], limits.get("force"))
     last = {key: solved[-1][1][key] for key in ("theory", "reference")}
+    # These theories are exact for the bodies of the model, unlike those of half-spaces or beams.
+    exact = isinstance(theory[0], (analytic.PressFit, analytic.HertzBox))
     return Series(
         combination, levels, failed, **last, equal_force=at_force, equal_force_spread=spread, quantities=names, limits=limits,
-        exact_theory=isinstance(theory[0], EXACT_THEORIES), share=theory[1], compared=theory[2], asked=asked,
+        exact_theory=exact, share=theory[1], compared=theory[2], asked=asked,
     )  # fmt: skip
 
 

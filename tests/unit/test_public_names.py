@@ -18,25 +18,27 @@ from fastcontact.results.step import Steps
 FOLDER = Path(fc.__file__).parent
 
 
-def imports_of_the_stub():
-    """The module and the name there that the stub gives for each public name."""
-    tree = ast.parse((FOLDER / "__init__.pyi").read_text(encoding="utf-8"))
+def imports_of_the_stub(package=fc):
+    """The module and the name there that the stub of a package gives for each public name."""
+    tree = ast.parse(Path(package.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
     lines = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
     return {alias.asname: (node.module, alias.name) for node in lines for alias in node.names}
 
 
-@pytest.mark.parametrize("name", fc.__all__)
-def test_a_name_is_what_the_stub_says(name):
-    module, there = imports_of_the_stub()[name]
+@pytest.mark.parametrize(
+    ("package", "name"), [(package, name) for package in (fc, fc.analytic, fc.obstacles) for name in package.__all__]
+)
+def test_a_name_is_what_the_stub_says(package, name):
+    module, there = imports_of_the_stub(package)[name]
     home = importlib.import_module(module)
     found = getattr(home, there) if hasattr(home, there) else importlib.import_module(f"{module}.{there}")
-    assert getattr(fc, name) is found
+    assert getattr(package, name) is found
 
 
 def test_the_package_has_all_names_of_the_stub_even_in_an_archive(tmp_path):
     with zipfile.ZipFile(tmp_path / "fastcontact.zip", "w") as archive:
-        for path in FOLDER.glob("*.py*"):
-            archive.write(path, f"fastcontact/{path.name}")
+        for path in (*FOLDER.glob("*.py*"), *FOLDER.glob("_tools/*.py")):
+            archive.write(path, f"fastcontact/{path.relative_to(FOLDER)}")
     code = "import sys; sys.path.insert(0, sys.argv[1]); import fastcontact as fc; print(fc.__file__, *fc.__all__)"
     file, *names = printed(code, tmp_path / "fastcontact.zip").split()
     assert file.startswith(str(tmp_path))

@@ -8,29 +8,17 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Iterator, Mapping
 
+from fastcontact._tools.lazy import LazyDict
 from fastcontact.contact.formulations._formulation import Formulation
 
 
-class _Formulations(Mapping[str, type[Formulation]]):
-    """The formulations by name. Each is imported at its first use, because most models use only one."""
-
-    _names = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_"))
-
-    def __getitem__(self, name: str) -> type[Formulation]:
-        if name not in self._names:
-            raise KeyError(name)
-        formulation: type[Formulation] = importlib.import_module(f"{__name__}.{name}").FORMULATION
-        return formulation
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
+def _imported(name: str) -> type[Formulation]:
+    formulation: type[Formulation] = importlib.import_module(f"{__name__}.{name}").FORMULATION
+    return formulation
 
 
-FORMULATIONS: Mapping[str, type[Formulation]] = _Formulations()
+# The formulations by name. Most models use only one.
+FORMULATIONS = LazyDict((name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_")), _imported)
 
 __all__ = ["FORMULATIONS", "Formulation"]

@@ -11,47 +11,6 @@ coordinate.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from fastcontact._tools.lazy import lazy_names
 
-from fastcontact.arrays import Array
-from fastcontact.contact.obstacles.meshed import MeshedSurface
-from fastcontact.contact.obstacles.shapes import Cylinder, FlatPunch, HalfSpace, Height, Sphere, cone, paraboloid
-from fastcontact.errors import getattr_and_dir
-
-
-class Obstacle(Protocol):
-    """A rigid shape."""
-
-    def distance(self, points: Array) -> tuple[Array, Array]:
-        """Return the signed distance (n,) [length] of `points` (n, dim) [length], and the unit outward normals (n, dim) [-].
-
-        The distance is infinite if a point cannot touch the obstacle.
-        """
-
-
-SHAPES: dict[str, Callable[..., Obstacle]] = {
-    "half_space": HalfSpace,
-    "sphere": Sphere,
-    "cylinder": Cylinder,
-    "paraboloid": paraboloid,
-    "cone": cone,
-    "flat_punch": FlatPunch,
-}
-
-__all__ = [
-    "SHAPES",
-    "Cylinder",
-    "FlatPunch",
-    "HalfSpace",
-    "Height",
-    "MeshedSurface",
-    "Obstacle",
-    "Sphere",
-    "cone",
-    "paraboloid",
-]
-
-
-if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
-    __getattr__, __dir__ = getattr_and_dir("fastcontact.obstacles", __all__)
+__getattr__, __dir__, __all__ = lazy_names(__name__, "fastcontact.obstacles")

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fastcontact.arrays import REFUSAL, Array, Mask, Numbers, is_masked
-from fastcontact.contact.obstacles import Obstacle
+from fastcontact.contact.obstacles._obstacle import Obstacle
 from fastcontact.errors import ContactError
 from fastcontact.round_off import LENGTH_ROUND_OFF
 

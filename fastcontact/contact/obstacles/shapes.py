@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from fastcontact._tools.argument_types import finite_vector, typed
 from fastcontact.arrays import Array
+from fastcontact.contact.obstacles._obstacle import Obstacle
 from fastcontact.errors import ContactError
 from fastcontact.round_off import ROUND_OFF
 
@@ -313,3 +314,14 @@ class FlatPunch:
         gap = sign * (points[:, -1] - self.height)
         beyond_edge = np.linalg.norm(points[:, :-1], axis=1) > self.radius * (1 + ROUND_OFF)
         return np.where(beyond_edge, np.inf, gap), normal
+
+
+# Shapes by name in case files.
+SHAPES: dict[str, Callable[..., Obstacle]] = {
+    "half_space": HalfSpace,
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "paraboloid": paraboloid,
+    "cone": cone,
+    "flat_punch": FlatPunch,
+}

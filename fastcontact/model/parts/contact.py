@@ -19,7 +19,7 @@ from fastcontact.contact.default_formulation import against_obstacle, default_fo
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.found_contacts import FoundContacts, find_contacts, nothing_found
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.contact.obstacles import MeshedSurface, Obstacle
+from fastcontact.contact.obstacles import Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.side_checks import check_obstacle, check_sides
@@ -312,6 +312,8 @@ class ModelContact(ModelConnections):
         >>> round(float(step.contact["ball"].force[1]), 6)
         -100.0
         """
+        from fastcontact.contact.obstacles.meshed import MeshedSurface
+
         components = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(components.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
         if not np.isfinite(displacement).all():

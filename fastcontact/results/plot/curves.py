@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.analytic.pressure_curve import NAMES, PressureCurve, pressure_curve
+from fastcontact.analytic.pressure_curve import PressureCurve, author, pressure_curve
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
@@ -400,7 +400,7 @@ def history(
     upper.plot(x, forces, "o", ms=4, label="computed")
     _plot_bounds(lower, x, np.array([c.radius for c in contacts]))
     if law is not None and approach is not None:
-        name = f"{NAMES.get(type(law), 'theory')}, equal approach"
+        name = f"{author(law)}, equal approach"
         approaches = x.max() * np.linspace(0.0, 1.0, 200)[1:] ** 2
         theory = [law.at_approach(d) for d in approaches]
         upper.plot([0.0, *approaches], [0.0, *(share * t.force for t in theory)], "k-", lw=1, label=name)

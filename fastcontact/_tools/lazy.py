@@ -1,0 +1,62 @@
+"""Public names of packages and entries of dictionaries whose modules are imported on first use."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def lazy_names(package: str, title: str = "") -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package.
+
+    The stub ``__init__.pyi`` of the package lists the names with their modules for type checkers; here they are imported on
+    first use. Messages call the package `title`, by default by its name.
+    """
+    stub = (pkgutil.get_data(package, "__init__.pyi") or b"").decode()
+    found = re.findall(r"^from ([\w.]+) import \(?\s*(\w+) as", stub, re.MULTILINE)
+    module_of = {name: module for module, name in found}
+    public = sorted(module_of.keys() - {"__version__"})
+
+    def attribute(name: str) -> Any:
+        if name not in module_of:
+            from fastcontact.errors import getattr_and_dir
+
+            return getattr_and_dir(title or package, public)[0](name)
+        owner = importlib.import_module(module_of[name])
+        is_module = hasattr(owner, "__path__")  # the public names of packages are modules
+        value = importlib.import_module(f"{owner.__name__}.{name}") if is_module else getattr(owner, name)
+        setattr(sys.modules[package], name, value)
+        return value
+
+    return attribute, lambda: sorted(module_of), public
+
+
+class LazyDict(Mapping[str, T]):
+    """Objects by name, which are imported on first use.
+
+    Parameters
+    ----------
+    names : iterable of str
+    load : Callable
+        Function that imports the object of a name.
+    """
+
+    def __init__(self, names: Iterable[str], load: Callable[[str], T]) -> None:
+        self._names, self._load = tuple(names), load
+
+    def __getitem__(self, name: str) -> T:
+        if name not in self._names:
+            raise KeyError(name)
+        return self._load(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
