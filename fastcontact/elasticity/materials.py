@@ -378,8 +378,8 @@ class LinearElastic(Material):
         Coefficient of thermal expansion, in one of the forms of E [1 / temperature].
     incompatible_modes : bool
         Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation. The modes
-        avoid shear locking in bending as well as volumetric locking, at about three times the cost of assembly and ten times
-        the cost of stress recovery. The option has no effect on other elements and in axisymmetry.
+        avoid shear locking in bending as well as volumetric locking, at four to six times the cost of assembly and 20 to 30
+        times the cost of stress recovery. The option has no effect on other elements and in axisymmetry.
     conductivity : float, callable or ndarray (n,), optional
         Thermal conductivity, greater than 0, in one of the forms of E [power / (length temperature)].
 
