@@ -354,7 +354,7 @@ def sliding_load(
 
 
 def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
-    """Return a contact result with Cauchy instead of nominal tractions, and widths in the deformed configuration.
+    """Return a contact result with displacements, Cauchy instead of nominal tractions, and deformed widths.
 
     The force of each node is preserved (lumped form of Nanson's formula: Bonet and Wood, 2008, equation 4.68).
 
@@ -371,6 +371,7 @@ def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement
     return replace(
         contact, pressure=contact.pressure * ratio, multiplier=contact.multiplier * ratio,
         shear=contact.shear * ratio[:, None], radius=(contact.radius[0] * stretch[0], contact.radius[1] * stretch[1]),
+        displacement=displacement[contact.points],
     )  # fmt: skip
 
 

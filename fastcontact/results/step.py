@@ -191,6 +191,8 @@ class ContactResult(Suggesting):
         Torque about the axis of rotation that holds a rotating rigid obstacle in equilibrium. It is equal to the moment of
         the contact forces on the deformable body in the deformed configuration [force times length]; None unless the
         obstacle rotates.
+    displacement : ndarray (m, dim), optional
+        Displacement of the secondary nodes in finite strain, where the contact forces act on the deformed body [length].
     middle : ndarray (dim,)
         Centre of the contact on the reference surface [length]. In axisymmetry it lies on the axis, unless the surface is
         parallel to it or closes on itself, like that of an O-ring; otherwise it is the centre of pressure, moved onto the
@@ -273,6 +275,7 @@ class ContactResult(Suggesting):
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
     heat_flux: Array | None = None
+    displacement: Array | None = None
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -316,6 +319,11 @@ class ContactResult(Suggesting):
     def _repr_html_(self) -> str:
         """Return a table for notebooks."""
         return html_table(self.shown.items(), caption=f"Contact '{self.name}', {self.formulation}")
+
+    @property
+    def positions(self) -> Array:
+        """Positions (m, dim) of the secondary nodes at which forces act: in finite strain the deformed ones [length]."""
+        return self.coordinates if self.displacement is None else self.coordinates + self.displacement
 
     @property
     def measured_from_axis(self) -> bool:
