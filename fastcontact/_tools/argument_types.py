@@ -165,9 +165,10 @@ def types_of(call: Callable[..., Any]) -> dict[str, Any]:
     """Return the types of the arguments of a function, or of the fields of a class, by name."""
     annotations: dict[str, Any] = {}
     namespace = vars(sys.modules[call.__module__])
-    for name, text in inspect.get_annotations(call).items():
+    for name, annotation in inspect.get_annotations(call).items():
+        text = getattr(annotation, "__forward_arg__", annotation)  # typed dictionaries contain forward references
         try:
-            annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), namespace)
+            annotations[name] = eval(text, namespace) if isinstance(text, str) else text
         except (NameError, TypeError):  # a name that only type checkers import, or not the annotation of an argument
             continue
     return annotations

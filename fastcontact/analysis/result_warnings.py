@@ -24,7 +24,6 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import stability_ratio
 from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.found_contacts import SOFTER
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
@@ -514,6 +513,8 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
 
 def _oscillation_remedy(pair: Formulation, model: Model) -> str:
     """Return the remedy for oscillating pressures of a pair."""
+    from fastcontact.contact.found_contacts import SOFTER
+
     side, primary = pair.secondary, pair.primary
     if isinstance(primary, Surface):
         modulus, other = (_modulus(model, surface.points) for surface in (side, primary))

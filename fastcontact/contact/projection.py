@@ -135,12 +135,11 @@ def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) ->
     # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
     distinct = np.flatnonzero(side.node_weights)
     deviates = np.einsum("pd,pd->p", normal[distinct], smooth[distinct]) < np.cos(np.radians(0.5 * corner))
-    corners = np.unique(node[distinct[deviates]])
-    by_node, start = (
-        distinct[np.argsort(node[distinct], kind="stable")],
-        np.append(0, np.cumsum(np.bincount(node[distinct]))),
-    )
-    for node_at_corner in corners:
+    if not deviates.any():
+        return smooth.reshape(*side.all_local.shape, dim)
+    by_node = distinct[np.argsort(node[distinct], kind="stable")]
+    start = np.append(0, np.cumsum(np.bincount(node[distinct])))
+    for node_at_corner in np.unique(node[distinct[deviates]]):
         entries = by_node[start[node_at_corner] : start[node_at_corner + 1]]
         similar = normal[entries] @ normal[entries].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
         total = (similar * weight[entries]) @ normal[entries]

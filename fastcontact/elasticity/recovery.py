@@ -9,7 +9,7 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed, unchecked
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.elasticity import dilatation, dilatation_kernels, incompatible_modes, incompatible_modes_kernels
+from fastcontact.elasticity import dilatation, incompatible_modes
 from fastcontact.elasticity.energy import gradients_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
@@ -96,6 +96,8 @@ class CellStress:
             else:
                 self._fill_varying((name, xi, N, dN), nodes, numbers, moduli, stress)
             if split is not None:
+                from fastcontact.elasticity import dilatation_kernels
+
                 options = of_cells(numbers), self._axisymmetric, self._displacement
                 bases = dilatation.basis(name, element.quadrature[0]), dilatation.basis(name, xi)
                 element_tables = *element.tables, bases[0], split.bulk
@@ -135,6 +137,8 @@ class CellStress:
         rows: Indices,
     ) -> None:
         """Add the stresses due to incompatible modes, for the moduli that are marked in `with_modes` (n_materials,)."""
+        from fastcontact.elasticity import incompatible_modes_kernels
+
         name, xi, dN = location
         numbers, offset_stress = material.reshape(len(cells), -1), np.empty((0, 0, 0))
         if self._offset is not None:

@@ -13,14 +13,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Mask, Numbers
-from fastcontact.elasticity import (
-    dilatation,
-    dilatation_kernels,
-    element_2d_kernels,
-    element_3d_kernels,
-    incompatible_modes,
-    incompatible_modes_kernels,
-)
+from fastcontact.elasticity import dilatation, element_2d_kernels, element_3d_kernels, incompatible_modes
 from fastcontact.elasticity import stiffness_kernels as pattern_kernels
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
@@ -210,11 +203,15 @@ def _add_part(
         if bad >= 0:
             return int(bad) + rows.start
     if with_modes is not None:
+        from fastcontact.elasticity import incompatible_modes_kernels
+
         incompatible_modes_kernels.subtract_stiffness(
             mesh.points, cells, *incompatible_modes.tables(name), D, with_modes, material.reshape(len(cells), -1), slots,
             owner, number, data,
         )  # fmt: skip
     if split is not None:
+        from fastcontact.elasticity import dilatation_kernels
+
         basis = dilatation.basis(name, elements.get(name).quadrature[0])
         dilatation_kernels.add_stiffness(mesh.points, cells, *tables, basis, split.bulk, of_cells(material), *target)
     return -1

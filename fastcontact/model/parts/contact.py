@@ -9,7 +9,7 @@ import copy
 import dataclasses
 import logging
 from collections.abc import Mapping, Sequence
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from fastcontact._tools.argument_types import check_fields, typed
 from fastcontact.arrays import Mask
 from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
-from fastcontact.contact.found_contacts import FoundContacts, find_contacts, nothing_found
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles import Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -33,6 +32,9 @@ from fastcontact.model.parts.connections import ModelConnections
 from fastcontact.model.periodicity import representatives
 from fastcontact.model.ramp import History, table_of
 from fastcontact.model.repeated_pairs import check_repeated, share_facets
+
+if TYPE_CHECKING:
+    from fastcontact.contact.found_contacts import FoundContacts
 
 log = logging.getLogger("fastcontact")
 
@@ -190,6 +192,8 @@ class ModelContact(ModelConnections):
         1
         """
         moduli = self.contact_moduli() if self.materials else None
+        from fastcontact.contact.found_contacts import FoundContacts, find_contacts, nothing_found
+
         contacts = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
         if not contacts.pairs:
             raise ContactError(nothing_found(self.mesh, distance, angle, groups))
