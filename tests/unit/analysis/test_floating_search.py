@@ -162,8 +162,8 @@ def test_a_load_beyond_friction_ends_the_search_for_the_least_work(load, monkeyp
     a, unbalanced = _least_work(rates, slip, np.array([0.5, 0.5]), np.array([load]), np.zeros((1, 1)))
     assert sum(iterations) <= 40
     assert (unbalanced <= 1e-6) == (load < 1.0)
-    if load < 1.0:  # the force of the second point is one half
-        assert a == pytest.approx([(2 * load - 1) / np.sqrt(1 - (2 * load - 1) ** 2)], rel=1e-3)
+    # The force of the second point is one half.
+    assert load > 1.0 or a == pytest.approx([(2 * load - 1) / np.sqrt(1 - (2 * load - 1) ** 2)], rel=1e-3)
 
 
 def carried(dim, options, angle):
