@@ -121,9 +121,9 @@ class PositionResponse:
         position_error, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = float(norm(elongation - self.elongation_rates @ position_error))
         restrained = remaining <= SINGLE_PRECISION * norm(elongation)
-        # The linear response is more accurate than minimising the work of friction if it hardly changes the slips.
+        # The linear response is more accurate than minimising the work of friction unless it reverses slips.
         slip_change = largest(self.gap_rates[1:, sliding] @ position_error)
-        if not restrained or slip_change > NOTABLE * largest(solution.slip[sliding]):
+        if not restrained or slip_change > largest(solution.slip[sliding]):
             U, s, V = np.linalg.svd(self.elongation_rates)
             # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for
             # example only because the friction force turns with the slip direction (a box that rides on a driven one in 3D).
@@ -175,7 +175,8 @@ def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: A
 
     The lengths of the slips are smoothed by a parameter that decreases in steps. For each value of the parameter, Newton's
     method with a trust region minimises the sum. All data are dimensionless, with magnitudes of about 1. The largest
-    component of the gradient is returned as well; it is not small if there is no minimum.
+    component of the gradient is returned as well; it is not small if there is no minimum, in which case the minimisation
+    ends as soon as the amplitudes contain a motion along which the sum decreases without bound.
 
     Parameters
     ----------
@@ -195,11 +196,9 @@ def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: A
         length = np.sqrt((total**2).sum(axis=0) + smoothing**2)
         return length, np.einsum("dm,dmz->mz", total / length, rates)
 
-    def work(a: Array) -> float:
-        return float(limit @ lengths(a)[0] + (0.5 * elastic @ a - load) @ a)
-
-    def gradient(a: Array) -> Array:
-        return np.asarray(limit @ lengths(a)[1] + elastic @ a - load)
+    def work(a: Array) -> tuple[float, Array]:
+        length, along = lengths(a)
+        return float(limit @ length + (0.5 * elastic @ a - load) @ a), limit @ along + elastic @ a - load
 
     def hessian(a: Array) -> Array:
         length, along = lengths(a)
@@ -207,14 +206,19 @@ def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: A
         turning = np.einsum("dmz,m,dmy", rates, weights, rates) - np.einsum("mz,m,my", along, weights, along)
         return np.asarray(turning + elastic)
 
+    def stop_if_unbounded(a: Array) -> None:
+        motion = unresisted @ (unresisted.T @ a)
+        if load @ motion - limit @ np.hypot.reduce(rates @ motion) > SINGLE_PRECISION * np.abs(motion).sum():
+            raise StopIteration
+
     a, smoothing, elastic = np.zeros(len(load)), SINGLE_PRECISION, np.zeros_like(tangent)
     values, vectors = np.linalg.eigh(0.5 * (tangent + tangent.T) - hessian(a))
-    elastic = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    smoothing, options = 1.0, {"maxiter": MAX_NEWTON_ITERATIONS}
+    elastic, unresisted = (vectors * np.maximum(values, 0.0)) @ vectors.T, vectors[:, values <= 0.0]
+    smoothing, options = 1.0, {"maxiter": MAX_NEWTON_ITERATIONS, "gtol": SINGLE_PRECISION}
     while smoothing > SINGLE_PRECISION:
         smoothing *= 0.1
-        a = minimize(work, a, jac=gradient, hess=hessian, method="trust-exact", tol=SINGLE_PRECISION, options=options).x
-    return a, largest(gradient(a))
+        a = minimize(work, a, (), "trust-exact", True, hessian, callback=stop_if_unbounded, options=options).x
+    return a, largest(work(a)[1])
 
 
 class FloatingBodies:

@@ -4,11 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+import scipy.optimize
 from models import elastic_model, made_of, plates, supported, united
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.analysis.floating_bodies import MAX_NEWTON_ITERATIONS, FloatingBodies, PositionResponse
+from fastcontact.analysis.floating_bodies import MAX_NEWTON_ITERATIONS, FloatingBodies, PositionResponse, _least_work
 from fastcontact.analysis.solution import Solution
 
 DOFS = np.array([0])
@@ -145,6 +146,24 @@ def test_bodies_do_not_slide_back():
         found = response.slack_position_change(np.array([0.1]), sliding, np.array([last_slide]))
         assert found[0] == pytest.approx([change], rel=1e-6)
         assert found[1] == remaining
+
+
+@pytest.mark.parametrize("load", [0.999, 1.001])
+def test_a_load_beyond_friction_ends_the_search_for_the_least_work(load, monkeypatch):
+    """Two points with forces of up to one half, which have slipped across the load and along it."""
+    iterations, minimise = [], scipy.optimize.minimize
+
+    def counted(*arguments, **options):
+        iterations.append((result := minimise(*arguments, **options)).nit)
+        return result
+
+    monkeypatch.setattr(scipy.optimize, "minimize", counted)
+    rates, slip = np.array([[[1.0], [1.0]], [[0.0], [0.0]]]), np.array([[0.0, 1.0], [1.0, 0.0]])
+    a, unbalanced = _least_work(rates, slip, np.array([0.5, 0.5]), np.array([load]), np.zeros((1, 1)))
+    assert sum(iterations) <= 40
+    assert (unbalanced <= 1e-6) == (load < 1.0)
+    # The force of the second point is one half.
+    assert load > 1.0 or a == pytest.approx([(2 * load - 1) / np.sqrt(1 - (2 * load - 1) ** 2)], rel=1e-3)
 
 
 def carried(dim, options, angle):
