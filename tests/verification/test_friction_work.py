@@ -210,6 +210,18 @@ def pressed_ball(solver="auto", steps=5, friction_while_touching=0.01, **changes
     return fc.solve(ball_on_block(**changes), steps, criteria=criteria, linear_solver=solver)
 
 
+@pytest.mark.parametrize("formulation", ["continuous", "mortar"])
+def test_nodal_tractions_obey_coulomb_and_have_the_resultant_of_the_forces(formulation):
+    contact = fc.solve(ball_on_block("plane_strain", "quad8", formulation=formulation), 3)[-1].contact["ball"]
+    shear = np.linalg.norm(contact.shear, axis=1)
+    assert (shear <= 0.3 * contact.pressure * (1.0 + 1e-9)).all()
+    order = np.argsort(contact.abscissa)
+    traction = (contact.shear + contact.pressure[:, None] * np.nan_to_num(contact.normal))[order]
+    length = np.diff(contact.coordinates[order[::2], 0])[:, None] / 6.0
+    total = (length * (traction[:-2:2] + 4.0 * traction[1::2] + traction[2::2])).sum(axis=0)
+    assert total == pytest.approx(contact.force, rel=0.015)
+
+
 @pytest.mark.each_value
 @pytest.mark.parametrize("kinematics", ["axisymmetric", "plane_strain"])
 @pytest.mark.parametrize(
