@@ -27,7 +27,7 @@ from fastcontact.linear.protocol import Loaded
 from fastcontact.model.model import gap_changes
 from fastcontact.model.pretension import loose_bolts_remark
 from fastcontact.model.rigid_motions import cone_rows, generalised, grouped, needed_friction, stopped_at
-from fastcontact.round_off import SINGLE_PRECISION
+from fastcontact.round_off import SINGLE_PRECISION, SUM_ROUND_OFF
 
 # Number of times that contact displaces fluid from a node in a load step after which the node stays dry. At the front of the
 # fluid a node may be neither dry, because its mean pressure is below that of the fluid, nor wet, because its gap would close.
@@ -290,7 +290,10 @@ def _with_floating_bodies(
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     position_response = None if problem.solver.iterative else partial(bodies.position_response, constraints, dofs)
     springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
-    soft_iterations = 0
+    soft_iterations, round_off = 0, state.gap_round_off
+    if position_response is not None:
+        # Displacements without contact forces, which are large if bodies are flexible, cancel.
+        round_off = max(round_off, SUM_ROUND_OFF * largest(step.loaded.full_solution(np.zeros(dofs.T.shape[1]))))
     if position_response is not None and constraints.tangents:
         # With stiff springs, a problem with friction may have several solutions, and none near the position of equilibrium.
         last_frictional, softened = iterate.frictional, bodies.with_soft_springs(step.loaded, dofs, loads[0])
@@ -300,7 +303,7 @@ def _with_floating_bodies(
             start = start + softly_held.u[springs]
         else:
             iterate.frictional = last_frictional
-    rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, state.gap_round_off)
+    rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, round_off)
     if rigid.solution.settled and not rigid.slack:
         gaps = gap_changes(problem.model, bodies.motions)
         raise failure(not_restrained(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
