@@ -296,7 +296,10 @@ def _with_floating_bodies(
         round_off = max(round_off, SUM_ROUND_OFF * largest(step.loaded.full_solution(np.zeros(dofs.T.shape[1]))))
     if position_response is not None and constraints.tangents:
         # With stiff springs, a problem with friction may have several solutions, and none near the position of equilibrium.
-        last_frictional, softened = iterate.frictional, bodies.with_soft_springs(step.loaded, dofs, loads[0])
+        last_frictional, softened = (
+            iterate.frictional,
+            bodies.with_soft_springs(step.loaded, dofs, loads[0], slides=not iterate.history),
+        )
         softly_held = solve_at(start, replace(step, loaded=softened))
         soft_iterations = softly_held.iterations
         if softly_held.settled:
