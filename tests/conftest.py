@@ -62,7 +62,7 @@ def prepare_workers(whole: bool) -> None:
     """Give each worker one processor; where all tests run on an empty cache, compile kernels that all workers need."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     folder = cache.cache_folder()
-    if whole and folder and decorators.compiled() and not any(folder.glob("*.nbc")):
+    if whole and folder and decorators.jit_enabled() and not any(folder.glob("*.nbc")):
         nonlinear = subprocess.Popen([sys.executable, "-c", NONLINEAR], cwd=ROOT)
         atexit.register(nonlinear.kill)
         for process in (*ahead.start((), decorators.threads()), nonlinear):

@@ -149,7 +149,7 @@ def solve_steps(
     instants = restart.remaining(ramp, last)
     if not instants:
         return iter(())
-    ahead.expect(_kernel_sets(model, linear_solver))
+    ahead.request_helpers(_kernel_sets(model, linear_solver))
     model.check(ramp)
     prepare_model = partial(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,

@@ -18,7 +18,7 @@ from typing import Any
 import numba.extending
 import numpy as np
 
-from fastcontact._jit.decorators import compiled
+from fastcontact._jit.decorators import jit_enabled
 from fastcontact.linear.multigrid import block_products_llvm
 
 Sizes = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
@@ -106,7 +106,7 @@ def add_transposed_plain(
 
 def _kernel(vectorised: Any, plain: Any) -> Any:
     """Return the function that kernels call: an intrinsic that generates `vectorised`, or `plain` without compilation."""
-    return numba.extending.intrinsic(vectorised) if compiled() else plain
+    return numba.extending.intrinsic(vectorised) if jit_enabled() else plain
 
 
 row_times = _kernel(block_products_llvm.row_times, row_times_plain)

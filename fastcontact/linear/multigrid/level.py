@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from fastcontact._jit.parallel import NODES, parallel_for
+from fastcontact._jit.parallel import NODES_PER_CELL, parallel_for
 from fastcontact.arrays import AnyArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
@@ -114,7 +114,9 @@ class Level:
     ) -> None:
         """Apply `cycle_kernels.relax` to the last step `d` (n,) and the iterate `x` (n,), in place, without corrections."""
         rows = self.A.rows
-        parallel_for(cycle_kernels.relax, self.n // len(rows), NODES, self.inverse, r, first, second, d, x, rows, begin)
+        parallel_for(
+            cycle_kernels.relax, self.n // len(rows), NODES_PER_CELL, self.inverse, r, first, second, d, x, rows, begin
+        )
 
     def residual(self) -> None:
         """Fill `r` with ``b - A x``."""
