@@ -214,7 +214,7 @@ class _Vibration:
         reduced = Reduced(system, M, contact.rows, contact.nodes)
         if n >= int(reduced.free.sum()):
             raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: request fewer")
-        solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], columns=True)
+        solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], needs_columns=True)
         solver.contrast = self.field.contrast
         free_nullspace = np.where(reduced.free[:, None], nullspace, 0.0)
         values, vectors = lowest(solver, (reduced.K, reduced.M), free_nullspace, reduced.free, n, self.shift)

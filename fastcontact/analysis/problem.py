@@ -336,7 +336,8 @@ def prepare(
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
         tolerance=choice.limited_tolerance(linear_tolerance, criteria.relative),
-        columns=not all(pair.eliminable for pair in pairs.values()), quadratic=linear_with_quadratic_cells(model),
+        needs_columns=not all(pair.eliminable for pair in pairs.values()),
+        has_quadratic_cells=linear_with_quadratic_cells(model),
     )  # fmt: skip
     field = model.material_field()
     solver.contrast = field.contrast
@@ -389,7 +390,7 @@ def linearised(
     """
     K, model, floating = problem.force_driven.stiffness(K), problem.model, problem.floating_bodies
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
-    solver, displacement = problem.solver.near(), problem.displacement(u)
+    solver, displacement = problem.solver.copy_for_similar_matrix(), problem.displacement(u)
     finite = problem.bodies and problem.bodies.finite
     if floating is not None and finite:
         motions = floating.motions

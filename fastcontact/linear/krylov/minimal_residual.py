@@ -9,21 +9,21 @@ import numpy as np
 from fastcontact.arrays import Array
 
 
-def gmres(product: Callable[[Array], Array], right_side: Array, tolerance: float, most: int) -> tuple[Array, bool]:
-    """Return an approximate solution x (n,) of ``A x = b`` by GMRES from x = 0, and whether it has converged.
+def gmres(product: Callable[[Array], Array], b: Array, tolerance: float, max_iterations: int) -> tuple[Array, bool]:
+    """Return an approximate solution x (n,) of ``A x = b``, and whether GMRES has converged (Saad, 2003, section 6.5).
 
-    The function of SciPy computes the final residual by another product, which is a fifth of all products if there are four
-    iterations (Saad, 2003, section 6.5).
+    The initial guess is zero. Unlike this function, that of SciPy computes the final residual by an additional product with
+    A, which is a fifth of all products if there are four iterations.
 
     Parameters
     ----------
     product : Callable
         Function from a vector v (n,) to ``A v`` (n,).
-    right_side : ndarray (n,)
-        Vector b.
+    b : ndarray (n,)
+        Right-hand side.
     tolerance : float
         Largest 2-norm of the residual, relative to that of b [-].
-    most : int
+    max_iterations : int
         Largest number of iterations.
 
     Raises
@@ -31,13 +31,13 @@ def gmres(product: Callable[[Array], Array], right_side: Array, tolerance: float
     LinAlgError
         If A is singular.
     """
-    size = float(np.linalg.norm(right_side))
-    if size == 0.0:
-        return np.zeros_like(right_side), True
-    basis, rotations = [right_side / size], list[Array]()
-    H, g = np.zeros((most + 1, most)), np.zeros(most + 1)
-    g[0] = size
-    for j in range(most):
+    norm = float(np.linalg.norm(b))
+    if norm == 0.0:
+        return np.zeros_like(b), True
+    basis, rotations = [b / norm], list[Array]()
+    H, g = np.zeros((max_iterations + 1, max_iterations)), np.zeros(max_iterations + 1)
+    g[0] = norm
+    for j in range(max_iterations):
         w = product(basis[j])
         for i, v in enumerate(basis):  # modified Gram-Schmidt orthogonalisation
             H[i, j] = v @ w
@@ -50,7 +50,7 @@ def gmres(product: Callable[[Array], Array], right_side: Array, tolerance: float
         rotations.append(np.array([[c, s], [-s, c]]))
         for vector in (H[j : j + 2, j], g[j : j + 2]):
             vector[:] = rotations[j] @ vector
-        if abs(g[j + 1]) <= tolerance * size:
+        if abs(g[j + 1]) <= tolerance * norm:
             break
     y = np.linalg.solve(np.triu(H[: j + 1, : j + 1]), g[: j + 1])
-    return np.asarray(y @ np.stack(basis[: j + 1])), bool(abs(g[j + 1]) <= tolerance * size)
+    return np.asarray(y @ np.stack(basis[: j + 1])), bool(abs(g[j + 1]) <= tolerance * norm)

@@ -75,41 +75,41 @@ def row_times_both_ways_plain(
 
 
 def add_product_plain(
-    to: Any, at: int, left: tuple[Any, ...], first: int, right: Any, second: int, sizes: Sizes
+    out: Any, start: int, left: tuple[Any, ...], left_start: int, right: Any, right_start: int, sizes: Sizes
 ) -> None:
-    """Add ``A B`` to the block (m, n), in double precision, that begins at ``to[at]``.
+    """Add ``A B`` to the block (m, n), in double precision, that begins at ``out[start]``.
 
     Parameters
     ----------
-    to : ndarray, at : int
-        Array that is changed in place, beginning at the position `at`.
-    left : tuple of ndarray, first : int
+    out : ndarray, start : int
+        Array that is changed in place, beginning at the position `start`.
+    left : tuple of ndarray, left_start : int
         Numbers of A (m, k), which may be split, and the position of the first one.
-    right : ndarray, second : int
+    right : ndarray, right_start : int
         Numbers of B (k, n), and the position of the first one.
     sizes : tuple of tuples
         Tuples of m, k and n zeros.
     """
     m, k, n = (len(size) for size in sizes)
-    A = sum(part[first : first + m * k].astype(float) for part in left).reshape(m, k)
-    to[at : at + m * n] += (A @ right[second : second + k * n].reshape(k, n).astype(float)).ravel()
+    A = sum(part[left_start : left_start + m * k].astype(float) for part in left).reshape(m, k)
+    out[start : start + m * n] += (A @ right[right_start : right_start + k * n].reshape(k, n).astype(float)).ravel()
 
 
 def add_transposed_plain(
-    to: Any, at: int, left: tuple[Any, ...], first: int, right: Any, second: int, sizes: Sizes
+    out: Any, start: int, left: tuple[Any, ...], left_start: int, right: Any, right_start: int, sizes: Sizes
 ) -> None:
     """Add ``A.T B`` with A (k, m); see `add_product_plain`."""
     m, k, n = (len(size) for size in sizes)
-    A = sum(part[first : first + k * m].astype(float) for part in left).reshape(k, m)
-    to[at : at + m * n] += (A.T @ right[second : second + k * n].reshape(k, n).astype(float)).ravel()
+    A = sum(part[left_start : left_start + k * m].astype(float) for part in left).reshape(k, m)
+    out[start : start + m * n] += (A.T @ right[right_start : right_start + k * n].reshape(k, n).astype(float)).ravel()
 
 
-def _kernel(vectorised: Any, plain: Any) -> Any:
+def _intrinsic_or_plain(vectorised: Any, plain: Any) -> Any:
     """Return the function that kernels call: an intrinsic that generates `vectorised`, or `plain` without compilation."""
     return numba.extending.intrinsic(vectorised) if jit_enabled() else plain
 
 
-row_times = _kernel(block_products_llvm.row_times, row_times_plain)
-row_times_both_ways = _kernel(block_products_llvm.row_times_both_ways, row_times_both_ways_plain)
-add_product = _kernel(block_products_llvm.add_product, add_product_plain)
-add_transposed = _kernel(block_products_llvm.add_transposed, add_transposed_plain)
+row_times = _intrinsic_or_plain(block_products_llvm.row_times, row_times_plain)
+row_times_both_ways = _intrinsic_or_plain(block_products_llvm.row_times_both_ways, row_times_both_ways_plain)
+add_product = _intrinsic_or_plain(block_products_llvm.add_product, add_product_plain)
+add_transposed = _intrinsic_or_plain(block_products_llvm.add_transposed, add_transposed_plain)

@@ -31,11 +31,11 @@ def multiply(low, high, indptr, indices, numbers, x, factor, z_factor, z, y, row
 
 
 @kernel
-def relax(low, high, inverse, r, first, second, d, x, rows, begin):
+def relax(low, high, inverse, r, first, second, d, x, rows, from_zero):
     """Perform a step of the Chebyshev iteration, ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
 
     `inverse` (n_rows * m * m,) contains the inverses of the diagonal blocks D. If `first` is zero, d need not be initialised.
-    If `begin` is true, the iteration starts at x = 0, and x need not be initialised (Saad, Iterative Methods for Sparse
+    If `from_zero` is true, the iteration starts at x = 0, and x need not be initialised (Saad, Iterative Methods for Sparse
     Linear Systems, 2003, algorithm 12.1).
     """
     m = len(rows)
@@ -48,7 +48,7 @@ def relax(low, high, inverse, r, first, second, d, x, rows, begin):
             if first != 0.0:
                 step += first * d[m * i + a]
             d[m * i + a] = step
-            if begin:
+            if from_zero:
                 x[m * i + a] = step
             else:
                 x[m * i + a] += step

@@ -58,7 +58,7 @@ class BlockMatrix:
     storage: Storage = ALL_BLOCKS
 
     @property
-    def exact(self) -> tuple[AnyArray, ...]:
+    def exact_data(self) -> tuple[AnyArray, ...]:
         """Arrays of the entries in full precision, as arguments of kernels: (data,), or (high, low) for a split matrix."""
         return (self.data,) if self.low is None else (self.data, self.low)
 
@@ -74,7 +74,7 @@ class BlockMatrix:
     def combine(self, factor: float, x: AnyArray, z_factor: float, z: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``z_factor * z + factor * A @ x``, in the precision of x; x and y must be different arrays."""
         real = x.dtype.type
-        numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
+        numbers = (self.data,) if x.dtype == self.data.dtype else self.exact_data
         if self.storage is not ALL_BLOCKS:
             length, n = self.storage[3], len(self.indptr) - 1
             parallel_for(
@@ -95,7 +95,7 @@ class BlockMatrix:
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
         size = len(self.rows)
-        blocks = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
+        blocks = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact_data]
         return np.asarray(sum(blocks[1:], blocks[0])).reshape(-1, size, size)
 
     def diagonal_part(self, data: AnyArray) -> AnyArray:
@@ -121,7 +121,7 @@ class BlockMatrix:
         starts = np.concatenate([[0], np.cumsum(count)])
         blocks = np.repeat(self.indptr[node] - starts[:-1], count) + np.arange(starts[-1])
         columns, data = self.indices[blocks][:, None] * size + np.arange(size), np.empty(starts[-1] * size)
-        symmetric_storage_kernels.rows_of(dofs, self.indptr, self.indices, self.storage, self.exact, size, data)
+        symmetric_storage_kernels.rows_of(dofs, self.indptr, self.indices, self.storage, self.exact_data, size, data)
         rows = csr_array((data, columns.ravel(), size * starts), shape=(len(dofs), (len(self.indptr) - 1) * size))
         rows.eliminate_zeros()
         return rows
@@ -130,7 +130,7 @@ class BlockMatrix:
         """Return a square matrix as a SciPy array, in double precision."""
         size, n = len(self.rows), len(self.indptr) - 1
         data = np.empty(len(self.indices) * size * size)
-        arrays = self.indptr, self.indices, self.storage, self.exact
+        arrays = self.indptr, self.indices, self.storage, self.exact_data
         parallel_for(symmetric_storage_kernels.expand, n, self.work_of_row, *arrays, size, data)
         return bsr_array((data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * (n * size,))
 
@@ -161,7 +161,7 @@ class ScaledMatrix:
     release : bool
         Whether the low parts may overwrite the numbers of K, which is empty afterwards. K and its parts are then never in
         memory at the same time, which reduces the peak memory with a million unknowns by a tenth.
-    like : ScaledMatrix, optional
+    source : ScaledMatrix, optional
         Matrix whose unit is reused, and also its storage if the pattern is the same. By default, the unit is chosen such that
         the largest stiffness is about one.
 
@@ -175,22 +175,22 @@ class ScaledMatrix:
     shape, blocksize : (int, int)
     """
 
-    def __init__(self, K: bsr_array, precision: str, release: bool = False, like: ScaledMatrix | None = None) -> None:
+    def __init__(self, K: bsr_array, precision: str, release: bool = False, source: ScaledMatrix | None = None) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self._store(K, precision, release, like)
+        self._store(K, precision, release, source)
 
-    def _store(self, K: bsr_array, precision: str, release: bool, like: ScaledMatrix | None = None) -> None:
+    def _store(self, K: bsr_array, precision: str, release: bool, source: ScaledMatrix | None = None) -> None:
         self.unit = 1.0
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        if like is None:
+        if source is None:
             size = range(K.blocksize[0])
             largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
             self.unit = float(0.5 ** np.round(np.log2(largest)))
         else:
-            self.unit = like.unit
-        self.scaled = _split_matrix(K, self.unit, release, None if like is None else like.scaled)
+            self.unit = source.unit
+        self.scaled = _split_matrix(K, self.unit, release, None if source is None else source.scaled)
 
     def change(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""
@@ -229,10 +229,10 @@ class ScaledMatrix:
         return self.scaled.absolute_product(u) / self.unit
 
 
-def _split_matrix(K: bsr_array, unit: float, release: bool, like: BlockMatrix | None) -> BlockMatrix:
+def _split_matrix(K: bsr_array, unit: float, release: bool, source: BlockMatrix | None) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`.
 
-    The storage of the matrix `like` is used if it has the same pattern.
+    The storage of the matrix `source` is used if it has the same pattern.
     """
     indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
     size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
@@ -241,8 +241,8 @@ def _split_matrix(K: bsr_array, unit: float, release: bool, like: BlockMatrix | 
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
     else:
         numbers = K.data.copy()
-    storage = ALL_BLOCKS if like is None else like.storage
-    if like is None or not (np.array_equal(indptr, like.indptr) and np.array_equal(indices, like.indices)):
+    storage = ALL_BLOCKS if source is None else source.storage
+    if source is None or not (np.array_equal(indptr, source.indptr) and np.array_equal(indices, source.indices)):
         storage = symmetric_storage(indptr, indices)
     n = numbers.size if storage is ALL_BLOCKS else len(storage[2]) * size * size
     high = np.empty(n, np.float32)
