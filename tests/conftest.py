@@ -29,7 +29,7 @@ from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
 model = fc.Model(fc.generate.block(), "plane_strain", strain="finite")
 model.add_material(fc.NeoHookean(E=1.0, nu=0.3))
 bodies = NonlinearBodies(model.mesh, "plane_strain", "finite", model.material_field())
-bodies.at(0.0 * model.mesh.points, bodies.beginning)
+bodies.at(0.0 * model.mesh.points, bodies.initial_history)
 """
 
 # The same examples in every run, so that no change fails by chance; `--hypothesis-profile=long` looks further.

@@ -249,7 +249,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
         if model.strain == "small":
             model.refuse_nonlinear("modes about a step are")
         deformation, rise = step.displacement, model.expanding_rise(temperature, step.temperature)
-        K = with_springs(bodies.at(deformation, bodies.beginning, rise=rise).K, model.springs)
+        K = with_springs(bodies.at(deformation, bodies.initial_history, rise=rise).K, model.springs)
     else:
         offset = model.stress_offset(temperature, initial, field, step.temperature)
         stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)

@@ -360,6 +360,6 @@ class ModelBase(NameSuggestions):
                 raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
             if self.temperatures or self.heat_loads:
                 raise ModelError("forces of bodies with thermal expansion depend on the temperature: see step.reaction")
-            return bodies.at(np.reshape(displacement, shape), bodies.beginning).force
+            return bodies.at(np.reshape(displacement, shape), bodies.initial_history).force
         K = stiffness(self.mesh, self.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)
