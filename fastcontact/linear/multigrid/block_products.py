@@ -25,7 +25,7 @@ Sizes = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 
 
 def row_times_plain(
-    indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, rows: tuple[int, ...], cols: tuple[int, ...]
+    indices: Any, entries: tuple[Any, ...], x: Any, begin: int, end: int, rows: tuple[int, ...], cols: tuple[int, ...]
 ) -> tuple[Any, ...]:
     """Return the product of one block row of a matrix with a vector, as a tuple of m numbers.
 
@@ -33,7 +33,7 @@ def row_times_plain(
     ----------
     indices : ndarray of int (n_blocks,)
         Block columns.
-    numbers : tuple of ndarray (n_blocks * m * n,)
+    entries : tuple of ndarray (n_blocks * m * n,)
         The numbers of the blocks, one block after the other. They may be split, see `symmetric_storage_kernels`.
     x : ndarray (n_columns * n,)
     begin, end : int
@@ -42,13 +42,13 @@ def row_times_plain(
         Tuples of m and n zeros: the size of a block.
     """
     m, n = len(rows), len(cols)
-    entries = slice(begin * m * n, end * m * n)
-    blocks = sum(part[entries].astype(x.dtype) for part in numbers).reshape(-1, m, n)
+    positions = slice(begin * m * n, end * m * n)
+    blocks = sum(array[positions].astype(x.dtype) for array in entries).reshape(-1, m, n)
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, n)[indices[begin:end]]))
 
 
 def row_times_both_ways_plain(
-    indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, row: int, factor: Any, y: Any,
+    indices: Any, entries: tuple[Any, ...], x: Any, begin: int, end: int, row: int, factor: Any, y: Any,
     rows: tuple[int, ...],
 ) -> tuple[Any, ...]:  # fmt: skip
     """Return the product of the blocks of a row with x, and add the products of the transposed blocks with x to y.
@@ -69,7 +69,7 @@ def row_times_both_ways_plain(
         Tuple of m zeros.
     """
     m, columns = len(rows), indices[begin:end]
-    blocks = sum(part[begin * m * m : end * m * m].astype(x.dtype) for part in numbers).reshape(-1, m, m)
+    blocks = sum(array[begin * m * m : end * m * m].astype(x.dtype) for array in entries).reshape(-1, m, m)
     y.reshape(-1, m)[columns] += np.einsum("kmn,m->kn", blocks, factor * x[row * m : (row + 1) * m])
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, m)[columns]))
 
@@ -91,7 +91,7 @@ def add_product_plain(
         Tuples of m, k and n zeros.
     """
     m, k, n = (len(size) for size in sizes)
-    A = sum(part[left_start : left_start + m * k].astype(float) for part in left).reshape(m, k)
+    A = sum(array[left_start : left_start + m * k].astype(float) for array in left).reshape(m, k)
     out[start : start + m * n] += (A @ right[right_start : right_start + k * n].reshape(k, n).astype(float)).ravel()
 
 
@@ -100,7 +100,7 @@ def add_transposed_plain(
 ) -> None:
     """Add ``A.T B`` with A (k, m); see `add_product_plain`."""
     m, k, n = (len(size) for size in sizes)
-    A = sum(part[left_start : left_start + k * m].astype(float) for part in left).reshape(k, m)
+    A = sum(array[left_start : left_start + k * m].astype(float) for array in left).reshape(k, m)
     out[start : start + m * n] += (A.T @ right[right_start : right_start + k * n].reshape(k, n).astype(float)).ravel()
 
 

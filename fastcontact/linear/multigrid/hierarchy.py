@@ -228,15 +228,15 @@ def transposed(P: BlockMatrix, columns_of_P: tuple[Numbers, Numbers, Numbers]) -
 def galerkin_product(A: BlockMatrix, P: BlockMatrix, columns_of_P: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
     """Return the Galerkin product ``P.T A P`` for a symmetric matrix A; `columns_of_P` is ``column_pattern(P, n)``."""
     n_coarse = len(columns_of_P[0]) - 1
-    count, near_count = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
+    count, fine_count = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     work = len(A.indices) / max(1, n_coarse)
     patterns = A.indptr, A.indices, P.indptr, P.indices, *columns_of_P[:2]
-    parallel_for(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, near_count)
+    parallel_for(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, fine_count)
     indptr = pointers(count)
     columns = np.empty(indptr[-1], np.int32)
     out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)
     parallel_for(
         galerkin_kernels.galerkin, n_coarse, work, A.indptr, A.indices, A.storage, A.exact_data, P.indptr, P.indices, P.data,
-        *columns_of_P, indptr, int(near_count.max(initial=0)), columns, out, P.rows, P.cols,
+        *columns_of_P, indptr, int(fine_count.max(initial=0)), columns, out, P.rows, P.cols,
     )  # fmt: skip
     return BlockMatrix(indptr, columns, out, P.cols, P.cols)

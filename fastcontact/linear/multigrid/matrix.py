@@ -22,10 +22,10 @@ Storage = tuple[Numbers, Numbers, Numbers, int]
 
 # Storage in which every block of the pattern is stored.
 ALL_BLOCKS: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
-# Largest number of parts into which the rows of a symmetric matrix are divided, and smallest number of rows of a part. This
-# number of parts suffices for many threads, and the results of a part remain in the cache. With more parts, more blocks would
-# be stored twice.
-MAX_PARTS, MIN_ROWS = 32, 1024
+# Largest number of strips into which the rows of a symmetric matrix are divided, and smallest number of rows of a strip. This
+# number of strips suffices for many threads, and the results of a strip remain in the cache. With more strips, more blocks
+# would be stored twice.
+MAX_STRIPS, MIN_ROWS = 32, 1024
 
 
 @dataclass(eq=False)
@@ -74,16 +74,16 @@ class BlockMatrix:
     def combine(self, factor: float, x: AnyArray, z_factor: float, z: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``z_factor * z + factor * A @ x``, in the precision of x; x and y must be different arrays."""
         real = x.dtype.type
-        numbers = (self.data,) if x.dtype == self.data.dtype else self.exact_data
+        entries = (self.data,) if x.dtype == self.data.dtype else self.exact_data
         if self.storage is not ALL_BLOCKS:
             length, n = self.storage[3], len(self.indptr) - 1
             parallel_for(
-                symmetric_storage_kernels.multiply, -(-n // length), self.work_of_row * length, self.storage, numbers, x,
+                symmetric_storage_kernels.multiply, -(-n // length), self.work_of_row * length, self.storage, entries, x,
                 real(factor), real(z_factor), z, y, self.rows,
             )  # fmt: skip
             return
         parallel_for(
-            cycle_kernels.multiply, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices, numbers, x,
+            cycle_kernels.multiply, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices, entries, x,
             real(factor), real(z_factor), z, y, self.rows, self.cols,
         )  # fmt: skip
 
@@ -235,32 +235,32 @@ def _split_matrix(K: bsr_array, unit: float, release: bool, source: BlockMatrix 
     The storage of the matrix `source` is used if it has the same pattern.
     """
     indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
-    size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
-    if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
+    size, entries = K.blocksize[0], K.data if K.data.base is None else K.data.base
+    if release and entries.size == K.data.size and entries.flags.owndata and entries.flags.c_contiguous:
         # Every number is read before it is overwritten. The numbers of K are invalid afterwards, and are therefore removed.
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
     else:
-        numbers = K.data.copy()
+        entries = K.data.copy()
     storage = ALL_BLOCKS if source is None else source.storage
     if source is None or not (np.array_equal(indptr, source.indptr) and np.array_equal(indices, source.indices)):
         storage = symmetric_storage(indptr, indices)
-    n = numbers.size if storage is ALL_BLOCKS else len(storage[2]) * size * size
+    n = entries.size if storage is ALL_BLOCKS else len(storage[2]) * size * size
     high = np.empty(n, np.float32)
-    _store_parts(indptr, indices, storage, unit, numbers.reshape(-1), size * size, high)
+    _store_parts(indptr, indices, storage, unit, entries.reshape(-1), size * size, high)
     with contextlib.suppress(ValueError):  # another array references the memory, which then stays allocated
-        numbers.resize(((n + 1) // 2,))
-    low = numbers.reshape(-1).view(np.float32)[:n]
+        entries.resize(((n + 1) // 2,))
+    low = entries.reshape(-1).view(np.float32)[:n]
     return BlockMatrix(indptr, indices, high, (0,) * size, (0,) * size, low, storage)
 
 
 def _store_parts(
-    indptr: Numbers, indices: Numbers, storage: Storage, unit: float, numbers: AnyArray, block_size: int, high: AnyArray
+    indptr: Numbers, indices: Numbers, storage: Storage, unit: float, entries: AnyArray, block_size: int, high: AnyArray
 ) -> None:
     """Fill `high` with the high parts of the stored blocks, of `block_size` numbers each, times `unit`.
 
-    `numbers` contains the numbers of all blocks. Its beginning is overwritten by the low parts.
+    `entries` contains the entries of all blocks. Its beginning is overwritten by the low parts.
     """
-    start, low = indptr if storage is ALL_BLOCKS else storage[0], numbers.view(np.float32)
+    start, low = indptr if storage is ALL_BLOCKS else storage[0], entries.view(np.float32)
     end, n, max_blocks = 0, len(indptr) - 1, int(np.diff(indptr).max(initial=0))
     while end < n:  # Up to row `safe_end`, low parts overwrite only numbers that have been read.
         first = end
@@ -269,20 +269,20 @@ def _store_parts(
         work = len(indices) / n if end == safe_end else 0
         parallel_for(
             symmetric_storage_kernels.store_rows, end - first, work, first, max_blocks, indptr, indices, storage, unit,
-            numbers, block_size, high, low,
+            entries, block_size, high, low,
         )  # fmt: skip
 
 
 def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     """Return the storage of a symmetric matrix.
 
-    The storage is `ALL_BLOCKS` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the parts.
+    The storage is `ALL_BLOCKS` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the strips.
     """
     n = len(indptr) - 1
-    length = max(MIN_ROWS, -(-n // MAX_PARTS))
+    length = max(MIN_ROWS, -(-n // MAX_STRIPS))
     row = np.repeat(np.arange(n, dtype=np.int32), np.diff(indptr))
-    same_part = row // length == indices // length
-    below, above, diagonal = same_part & (indices < row), same_part & (indices > row), indices == row
+    same_strip = row // length == indices // length
+    below, above, diagonal = same_strip & (indices < row), same_strip & (indices > row), indices == row
     ascending = (indices[1:] > indices[:-1]) | (row[1:] > row[:-1])
     transposed = np.sort(indices[below].astype(np.int64) * n + row[below])
     symmetric = np.array_equal(transposed, row[above].astype(np.int64) * n + indices[above])
