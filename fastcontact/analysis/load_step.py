@@ -115,7 +115,7 @@ def _end_of_step(
         bodies = solution.terms.bodies.at(u)
         end = replace(end, history=bodies.history)
         # In the first step, which begins without a history, the path is unknown.
-        if problem.bodies.flows_freely and load.rise is None and start.history:
+        if problem.bodies.halving_estimates_error and load.rise is None and start.history:
             displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
             size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
             end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))

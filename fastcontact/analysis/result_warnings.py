@@ -31,7 +31,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
-from fastcontact.elasticity.mass import portions
+from fastcontact.elasticity.mass import cell_portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.elasticity.recovery import BATCH
@@ -363,7 +363,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     In linear kinematics it is half the curl of the displacement (n_points, dim).
     """
     square, point = 0.0, np.zeros(mesh.dim)
-    for name, rows in portions(mesh):
+    for name, rows in cell_portions(mesh):
         element, nodes = elements.get(name), mesh.cells[name][rows]
         centre = element.nodes[: element.n_corners].mean(axis=0)[None]
         slopes, _ = slopes_at(displacement[nodes], mesh.points[nodes], element.gradient(centre))

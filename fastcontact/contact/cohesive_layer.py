@@ -17,7 +17,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.cohesion import ELASTIC, Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.round_off import DIFFERENCES, SINGLE_PRECISION, TINY
+from fastcontact.round_off import DIFFERENCE_STEP, SINGLE_PRECISION, TINY
 
 # Stiffness of the linearised layer where it softens, relative to that of the intact layer. It is the magnitude of the ratio
 # of the two slopes of the default law. With a smaller ratio, the iteration for a beam glued at its nodes does not converge.
@@ -182,7 +182,7 @@ def _derivative(law: CohesiveLaw, jump: Array, compression: float) -> Array:
         traction[0] = np.where(jump[0] < 0.0, compression * jump[0], traction[0])
         return traction
 
-    step = DIFFERENCES * np.linalg.norm(jump, axis=0)
+    step = DIFFERENCE_STEP * np.linalg.norm(jump, axis=0)
     units = np.eye(len(jump))[:, :, None] * step
     return np.stack([(traction(jump + unit) - traction(jump - unit)) / (2.0 * step) for unit in units], axis=1)
 

@@ -88,7 +88,7 @@ def test_every_option_of_contact_pairs_is_listed():
 def test_every_formulation_solver_shape_and_theory_is_named():
     for name in FORMULATIONS:
         assert f"`{name}`" in text("howto/formulation.md"), name
-    for name in linear.KNOWN:
+    for name in linear.SOLVER_NAMES:
         assert f'(`"{name}"`)' in text("theory/linear-algebra.md"), name
     for name in fc.obstacles.SHAPES:
         assert f"| `{name}`" in text("howto/rigid-indenter.md"), name

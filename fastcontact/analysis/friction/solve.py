@@ -31,7 +31,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
+from fastcontact.linear.delassus import MAX_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
@@ -141,7 +141,7 @@ def _with_included(
     """
     rows = np.flatnonzero(included)
     k, m = len(constraints.tangents), len(constraints)
-    check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
+    check_rows((1 + k) * len(rows), MAX_ROWS_WITH_FRICTION)
     all_rows = csr_array(vstack([constraints.B, *constraints.tangents], format="csr"))
     R = all_rows[(np.arange(1 + k)[:, None] * m + rows).ravel()]
     gaps_at_rest = constraints.gaps_at_rest()

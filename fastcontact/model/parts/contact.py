@@ -23,7 +23,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
-from fastcontact.elasticity.loads import Value, axes_of, check_number
+from fastcontact.elasticity.loads import Value, axis_values, check_number
 from fastcontact.errors import ContactError, ModelError, check_known
 from fastcontact.model.contact_pair import ContactPair, DrivingForce, FluidPressure, method, rotation_of
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
@@ -318,7 +318,7 @@ class ModelContact(ModelConnections):
         """
         from fastcontact.contact.obstacles.meshed import MeshedSurface
 
-        components = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
+        components = axis_values(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(components.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
         if not np.isfinite(displacement).all():
             raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
@@ -372,7 +372,7 @@ class ModelContact(ModelConnections):
         """
         if not force:
             return ()
-        forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
+        forces = axis_values(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
         for axis, value in forces.items():
             check_number(f"the force {'xyz'[axis]} on obstacle '{name}'", value)
             if axis in motion:
