@@ -111,7 +111,7 @@ def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapol
             assert part.nodal is not None
             last_active = iterate.active[name]
             last_active = last_active if extrapolation is None else extrapolation.active(name, last_active)
-            active = part.nodal.initially_active(part.gap0 + part.B @ iterate.u, iterate.pressure[name], last_active)
+            active = part.nodal.initial_active_set(part.gap0 + part.B @ iterate.u, iterate.pressure[name], last_active)
         sets.append(active)
     return np.concatenate(sets)
 

@@ -281,7 +281,7 @@ class Problem:
             depth,
             state.bonds.get(name),
             load.fluids.get(name, 0.0),
-            linearised=None if self.linearised_at is None else self.displacement(self.linearised_at),
+            linearisation_point=None if self.linearised_at is None else self.displacement(self.linearised_at),
             friction_factor=load.friction_factors.get(name, 1.0),
         )
 

@@ -188,7 +188,7 @@ class MovingContact:
         for side in self._surfaces():
             m = len(side.points)
             local = csr_array((np.ones(m), (side.points, np.arange(m))), (n, m))
-            neighbours = neighbours + local @ side.near @ local.T
+            neighbours = neighbours + local @ side.extended_adjacency @ local.T
         moving = np.ones(len(self.constraints))
         for name, pair in self.problem.pairs.items():
             if pair.options.kind == "tied":  # paired once, before any load

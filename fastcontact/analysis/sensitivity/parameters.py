@@ -43,7 +43,7 @@ def _constant_derivatives(contact: MovingContact, parameter: Label) -> Change:
             (_with_constant(m, name, component, increment) if i == number else m, groups)
             for i, (m, groups) in enumerate(model.materials)
         ]
-        pairs = {pair.name: changed_model.bind(pair, problem.pairs[pair.name].held) for pair in changed_model.contact}
+        pairs = {p.name: changed_model.bind(p, problem.pairs[p.name].held_motions) for p in changed_model.contact}
         return replace(contact, problem=replace(problem, model=changed_model, pairs=pairs))
 
     # Central differences with an error of fourth order in the step.

@@ -25,7 +25,7 @@ from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import check_nodes, deck_mesh_of, group_of_surface
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
 from fastcontact.cases.decks.steps import MOST_INCREMENTS
-from fastcontact.contact.integration import all_nodes_carry
+from fastcontact.contact.integration import all_nodes_carry_pressure
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic
@@ -253,7 +253,7 @@ class Building:
         """Return the options that exclude nodes from contact: those on the facets, but not in the node-based surface."""
         excluded = point_group(self.model, self.assembly, "without contact", self.assembly.excluded[secondary])
         options: dict[str, Any] = {"excluded": excluded}
-        if all(map(all_nodes_carry, self.assembly.groups[secondary])):
+        if all(map(all_nodes_carry_pressure, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
             pair, f"the nodes of surface '{pair.secondary}' do not form whole faces: of the facets around them, only "

@@ -10,7 +10,7 @@ import numpy as np
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, look_up, refusing, register
 from fastcontact.cases.decks.content import Content, Interaction, Step
 from fastcontact.cases.decks.histories import JUMP
-from fastcontact.contact.cohesion import ELASTIC
+from fastcontact.contact.cohesion import INITIATION_RATIO
 from fastcontact.contact.conductance import Conductance
 from fastcontact.contact.overclosure import TabularLaw
 from fastcontact.errors import ContactError
@@ -165,7 +165,8 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
     constants = {"strength": strength, "shear_strength": shear, "initiation": criterion}
     constants.update(_evolution(evolution, constants, stiffness))
     if stiffness is None:
-        content.note(behaviour, f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which it fails")
+        opening = f"{INITIATION_RATIO:g} of the opening at which it fails"
+        content.note(behaviour, f"without a stiffness, damage begins at {opening}")
     else:
         constants["stiffness"] = stiffness
     content.note(behaviour, "sides that are pressed together have the stiffness of the layer, even where it is broken")
@@ -205,7 +206,7 @@ def _evolution(block: Block, initiation: dict[str, Any], stiffness: float | None
         raise block.refuse(
             "TYPE=DISPLACEMENT is supported only with CRITERION=QUADS and equal strengths: give energies"
         )
-    failure_opening = value / (1.0 - ELASTIC) if stiffness is None else strength / stiffness + value
+    failure_opening = value / (1.0 - INITIATION_RATIO) if stiffness is None else strength / stiffness + value
     return {"energy": 0.5 * strength * failure_opening}
 
 
