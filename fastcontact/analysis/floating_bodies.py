@@ -225,7 +225,8 @@ class FloatingBodies:
         self._spring_labels = []
         for dof, modes_at_spring in zip(self.dofs.tolist(), self._values_at_springs, strict=True):
             row, component = divmod(dof, self._dim)
-            obstacle = motions.labels[int(np.argmax(np.abs(motions.parts[:, np.argmax(np.abs(modes_at_spring))])))].body
+            weights_of_mode = motions.weights[:, np.argmax(np.abs(modes_at_spring))]
+            obstacle = motions.labels[int(np.argmax(np.abs(weights_of_mode)))].body
             self._spring_labels.append(f"{'xyz'[component]} of {obstacle if no_stiffness[dof] else f'point {row}'}")
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._values_at_springs), np.float64))
         # A body on soft springs of the model that slides on an incline moves in all directions, which stiffer springs would

@@ -375,7 +375,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 def _open_clearances(problem: Problem, state: State) -> set[str]:
     """Return the names of automatically detected pairs that begin open and never close, such as a shank in its hole."""
-    gap_by_pair = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
+    gap_by_pair = {pair.name: pair.detected_gap for pair in problem.model.contact if pair.detected_gap is not None}
     if not state.touched & gap_by_pair.keys():
         return set()
     least_gap = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())

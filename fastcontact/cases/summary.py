@@ -12,7 +12,7 @@ from fastcontact.analysis.resultants import contact_resultants
 from fastcontact.cases.case import Case, Label
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
-from fastcontact.model.rigid_motions import grouped
+from fastcontact.model.rigid_motions import grouped_by_body
 from fastcontact.results.step import ContactResult, StepResult, force_text
 from fastcontact.results.units import units_of_results, value_text, with_unit
 
@@ -235,7 +235,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         rows.append(f"  {temperatures}; heat into the bodies by {supports}, {powers}{contacts}")
     if report := summary["regularised"]:
         rows.append(
-            f"  held by contact alone: {grouped(report['motions'])}. Regularised by springs of "
+            f"  held by contact alone: {grouped_by_body(report['motions'])}. Regularised by springs of "
             f"{value_text(report['spring_stiffness'], units, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} "
             "of the load at the end"
         )

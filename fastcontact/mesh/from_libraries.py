@@ -15,7 +15,7 @@ from fastcontact.errors import FileError, MeshError, warn
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.files.meshio_content import INCONSISTENCY_ERRORS, VERTEX, mesh_of
-from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_parts
+from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_mesh
 from fastcontact.mesh.mesh import Mesh
 
 # Prefix of the arrays of 0 and 1 that represent groups in result files.
@@ -61,7 +61,7 @@ def from_meshio(mesh: Any) -> Mesh:
         raise MeshError(f"meshio's mesh {MASKED_ENTRIES}")
     # For files of Gmsh, meshio keeps the dimension with the names of tags, and a cell occurs once for each of its groups.
     file_format = "gmsh" if any(key.startswith("gmsh:") for key in mesh.cell_data) else ""
-    return _mesh_of(plain_parts(mesh), file_format, "meshio's mesh")
+    return _mesh_of(plain_mesh(mesh), file_format, "meshio's mesh")
 
 
 def from_pyvista(grid: Any) -> Mesh:

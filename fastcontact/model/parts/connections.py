@@ -449,8 +449,10 @@ class ModelConnections(ModelInitialStates):
         stiffness = {"axial": axial, "transverse": transverse}
         along_line = {key: value for key, value in stiffness.items() if value is not None}
         vector = self._direction(name, along_line, to is not None, direction)
-        axes = {} if along_line and {*components.values()} <= {None} else axis_values(name, components, self.mesh.dim)
-        for value in [*axes.values(), *along_line.values()]:
+        along_axes = (
+            {} if along_line and {*components.values()} <= {None} else axis_values(name, components, self.mesh.dim)
+        )
+        for value in [*along_axes.values(), *along_line.values()]:
             check_number(f"the stiffness of {name}", value)
             if not value > 0:
                 raise ModelError(f"{name}: the stiffness {value:g} must be positive")
@@ -461,7 +463,7 @@ class ModelConnections(ModelInitialStates):
         if opposite is None:
             if translation is not None:
                 raise ModelError(f"{name} acts on the ground: leave out the translation, or name the second group")
-            self.springs.append(ground_springs(name, nodes, axes, self.n_dofs, self.mesh.dim, along_line, vector))
+            self.springs.append(ground_springs(name, nodes, along_axes, self.n_dofs, self.mesh.dim, along_line, vector))
             return
         if len(nodes) > 1 < len(opposite):
             match = matching_nodes(self.mesh, (str(group), nodes), (str(to), opposite), translation)
@@ -469,4 +471,4 @@ class ModelConnections(ModelInitialStates):
         elif translation is not None:
             raise ModelError(f"{name} connects all nodes with a single one: leave out the translation")
         first, second = np.broadcast_arrays(nodes, opposite)
-        self.springs.append(connecting_springs(name, self.mesh.points, (first, second), axes, along_line, vector))
+        self.springs.append(connecting_springs(name, self.mesh.points, (first, second), along_axes, along_line, vector))

@@ -195,10 +195,10 @@ class ModelLoads(ModelHeat):
         >>> model.add_hydrostatic_pressure("RIGHT", weight=9.81e-6, level=0.8)
         """
         name = "xyz"[self.mesh.dim - 1] if axis is None else axis
-        (along,) = axis_values(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
+        (vertical,) = axis_values(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
         for quantity, value in (("weight", weight), ("level", level)):
             check_number(f"the {quantity} of the hydrostatic pressure on '{group}'", value)
-        self.add_pressure(group, loads.Hydrostatic(float(weight), float(level), along), ramp=ramp)
+        self.add_pressure(group, loads.Hydrostatic(float(weight), float(level), vertical), ramp=ramp)
 
     def add_force(
         self,
