@@ -104,7 +104,7 @@ def gap_heat_generation(content: Content, current: Interaction, block: Block) ->
     current.friction_heat = block.location, heat_fraction
 
 
-def store_cohesion(content: Content, current: Interaction, block: Block) -> None:
+def store(content: Content, current: Interaction, block: Block) -> None:
     """Store *COHESIVE BEHAVIOR, *DAMAGE INITIATION or *DAMAGE EVOLUTION, which are interpreted together."""
     if block.keyword in current.cohesion:
         raise block.error(f"surface interaction '{current.name}' has this keyword twice")

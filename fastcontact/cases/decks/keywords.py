@@ -102,14 +102,11 @@ TRANSLATED = {
         "material", ignore_with_note("no effect, because heat conduction is steady or temperatures are given"), ANYTHING
     ),
     # Below *SURFACE INTERACTION.
-    "COHESIVE BEHAVIOR": Keyword("interaction", interactions.store_cohesion, "TYPE; ELIGIBILITY"),
+    "COHESIVE BEHAVIOR": Keyword("interaction", interactions.store, "TYPE; ELIGIBILITY"),
     "DAMAGE EVOLUTION": Keyword(
-        "interaction",
-        interactions.store_cohesion,
-        "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO",
-        "DEGRADATION",
+        "interaction", interactions.store, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
     ),
-    "DAMAGE INITIATION": Keyword("interaction", interactions.store_cohesion, "CRITERION"),
+    "DAMAGE INITIATION": Keyword("interaction", interactions.store, "CRITERION"),
     "DAMAGE STABILIZATION": Keyword(
         "interaction", ignore_with_note("no effect: damage has no viscous regularisation"), ANYTHING
     ),
