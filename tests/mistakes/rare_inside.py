@@ -19,7 +19,7 @@ import fastcontact as fc
 from fastcontact._tools import hdf5
 from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.cases.case import read_case
-from fastcontact.cases.keys import called
+from fastcontact.cases.keys import call_with_keys
 from fastcontact.cli import _study, bench, cases
 from fastcontact.cli._outputs import check_outputs
 from fastcontact.contact.configuration import Configuration
@@ -224,8 +224,8 @@ CALLS = [
     ("a sweep without a point", no_point, fc.MeshError, r"no point of the sweep could be solved; .*: the mesh is folded"),
     ("packed data larger than unpacked", packed_beyond_its_size, fc.errors.FileError, r"is larger compressed than uncompressed: the file is damaged; write it again"),
     ("a file name beyond all limits", name_too_long, fc.errors.FileError, r"cannot be written \(File name too long\): name another file"),
-    ("a table that a function cannot take", lambda: called("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are invalid \(cannot unpack"),
-    ("a table with a text for numbers", lambda: called("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are invalid \(could not convert"),
+    ("a table that a function cannot take", lambda: call_with_keys("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are invalid \(cannot unpack"),
+    ("a table with a text for numbers", lambda: call_with_keys("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are invalid \(could not convert"),
     ("a size that is no number", lambda: fc.generate.quarter_disc(size="x"), fc.MeshError, r"^the argument size of quarter_disc must be a number or None, not the string 'x'$"),
     ("one size for two", lambda: fc.generate.block(1.0), fc.MeshError, r"^the argument size of block must be two numbers, not the float 1\.0$"),
     ("arrays of meshio that do not fit together", arrays_apart, fc.MeshError, r"the arrays of meshio's mesh do not fit together: list index out of range"),
