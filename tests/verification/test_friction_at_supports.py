@@ -370,3 +370,26 @@ def test_facets_that_meet_a_plane_of_symmetry_at_an_angle_do_not_penetrate(frict
         assert np.abs(contact.gap).max() < 1e-7 * np.abs(step.displacement).max()
         forces.append(np.linalg.norm(contact.force))
     assert forces[1] == pytest.approx(forces[0], rel=0.02)
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_friction_on_an_inclined_seat_whose_end_is_supported(driven):
+    """A wedge of 15 degrees slides in its seat; either may be pushed. Its supported end lies within the seat."""
+    slope, mu = np.tan(np.radians(15.0)), 0.2
+    wedge, seat = (fc.generate.block((1.0, 1.0), divisions) for divisions in ((4, 10), (6, 14)))
+    x, y = wedge.points.T
+    wedge = wedge.replace(points=np.column_stack([(10.0 + slope * (2.0 + 10.0 * y)) * x, 2.0 + 10.0 * y]))
+    x, y = seat.points[:, 0], 14.0 * seat.points[:, 1]
+    inner = 10.0 + slope * y
+    seat = seat.replace(points=np.column_stack([inner + (45.0 - inner) * x, y]))
+    parts = {"S": wedge, "H": seat}
+    mesh = fc.generate.union(*(fc.generate.renamed(m, f"{name}_{{}}".format) for name, m in parts.items()))
+    model = elastic_model(mesh, "plane_strain", E=210e3, S_LEFT="x", H_RIGHT="x")
+    model.prescribe("S_TOP", y=-0.02 * driven)
+    model.prescribe("H_BOTTOM", y=0.02 * (not driven))
+    model.add_contact("c", secondary="S_RIGHT", primary="H_LEFT", friction=mu)
+    contact = fc.solve(model, 1)[-1].contact["c"]
+    assert not contact.sticking.any()
+    angle = np.arctan(slope)
+    expected = contact.normal_force * (np.sin(angle) + mu * np.cos(angle))
+    assert contact.force[1] == pytest.approx(expected, rel=1e-3)  # 5 % less with the normals of a plane of symmetry

@@ -18,7 +18,6 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints, Linearised
 from fastcontact.contact.held_motions import (
     SAME_DIRECTION,
-    SMOOTH_INCLINATION,
     HeldMotions,
     deflate,
     direction_fields,
@@ -149,8 +148,9 @@ class Formulation(ABC):
         if self.surface_smoothing and not isinstance(self.primary, Surface):
             raise ContactError("surface_smoothing needs two meshed sides: leave it out at an obstacle")
         if self.friction:
-            self.secondary = self._reflected(self.secondary)
-            self.primary = self._reflected(self.primary) if isinstance(self.primary, Surface) else self.primary
+            secondary, primary = self.secondary, self.primary
+            self.secondary = self._reflected(secondary, primary)
+            self.primary = self._reflected(primary, secondary) if isinstance(primary, Surface) else primary
         excluded, cohesion = self.options.excluded, self.options.cohesion
         self.excluded = np.zeros(len(self.points), bool) if excluded is None else excluded
         has_shear_tractions = cohesion is not None and not cohesion.reversible
@@ -646,18 +646,18 @@ class Formulation(ABC):
         held[nodes] = common
         return held
 
-    def _reflected(self, side: Surface) -> Surface:
-        """Return a side whose averaged normals at planes of symmetry are those of the full model.
-
-        A plane of symmetry is recognised by supports along its normal at the edge of the side.
-        """
+    def _reflected(self, side: Surface, opposite: Surface | RigidSide) -> Surface:
+        """Return a side whose averaged normals at planes of symmetry are those of the full model; see `symmetry_planes`."""
         if self.held_motions is None or not np.isin(side.points, self.held_motions.nodes).any():
             return side
-        held = _without_complete_facets(self.held_motions.projectors_at(side.points), side)
-        normal = nodal_normals(side, self.points)
-        inclination = np.linalg.norm(np.einsum("nde,ne->nd", held, normal), axis=1)
-        nodes = np.flatnonzero(held.any(axis=(1, 2)) & (inclination < SMOOTH_INCLINATION))
-        reflections = np.eye(self.points.shape[1]) - 2.0 * held[nodes]
+        across = np.zeros((len(side.points), *2 * (self.points.shape[1],)))  # projectors onto the normals of the planes
+        for axis, nodes in symmetry_planes(self.held_motions, side, self.points, self.points[opposite.points]):
+            across[nodes] += np.outer(axis, axis)
+        across = _without_complete_facets(across, side)
+        nodes = np.flatnonzero(across.any(axis=(1, 2)))
+        if not len(nodes):
+            return side
+        reflections = np.eye(self.points.shape[1]) - 2.0 * across[nodes]
         return replace(side, periodic_ends=(*side.periodic_ends, (nodes, nodes, reflections)))
 
     def _closing_slip(
