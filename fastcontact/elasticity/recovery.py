@@ -255,7 +255,7 @@ def nodal_stress(
             rows = slice(first, first + size)
             numbers = np.arange(first, min(first + size, len(block)))
             values = stress.at(name, xi, block[rows], material[name][rows], numbers)
-            _add(average, slots[name][rows], element.extrapolation, values)
+            _add_values(average, slots[name][rows], element.extrapolation, values)
     return average.result()
 
 
@@ -290,7 +290,7 @@ class NodalAverage:
         return self._total
 
 
-_add = unchecked(NodalAverage.add)
+_add_values = unchecked(NodalAverage.add)
 
 
 @typed(ModelError)

@@ -56,12 +56,12 @@ def forward(start: Offsets, values: Array, first: Offsets, row_start: Offsets, r
         change[:below] = 0.0
         for j in range(low, high):
             xj = x[j]
-            at = start[j] + 1
+            entry = start[j] + 1
             for k in range(j + 1, high):
-                x[k] -= values[at] * xj
-                at += 1
+                x[k] -= values[entry] * xj
+                entry += 1
             for k in range(below):
-                change[k] += values[at + k] * xj
+                change[k] += values[entry + k] * xj
         for k in range(below):
             x[rows[row_start[s] + k]] -= change[k]
 

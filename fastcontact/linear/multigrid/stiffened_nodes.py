@@ -85,19 +85,19 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     opposite, stiffened = np.ones(n // size, bool), np.zeros(n // size, bool)
     opposite[pivots // size], stiffened[nodes] = False, True
     is_opposite, direction = opposite[W.col // size], W.col % size
-    follows = stiffened[W.col // size] & (direction == (pivots % size)[W.row]) & (W.data > 0.0)
-    unknowns, column = np.unique(W.col[follows], return_inverse=True)
-    mean = csr_array((W.data[follows], (column, W.row[follows])), shape=(len(unknowns), m))
+    is_follower = stiffened[W.col // size] & (direction == (pivots % size)[W.row]) & (W.data > 0.0)
+    unknowns, column = np.unique(W.col[is_follower], return_inverse=True)
+    mean = csr_array((W.data[is_follower], (column, W.row[is_follower])), shape=(len(unknowns), m))
     # Displacement of each pivot due to unit translations of the opposite side along each direction.
     translation = csr_array((W.data[is_opposite], (W.row[is_opposite], direction[is_opposite])), shape=(m, size))
     pivot_motion = np.asarray((mean @ translation).toarray())
-    couples = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= SMALLEST_MOTION * np.asarray(mean.sum(axis=1))
-    unknowns, mean, pivot_motion = unknowns[couples], csr_array(mean[couples]), pivot_motion[couples]
+    coupled = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= SMALLEST_MOTION * np.asarray(mean.sum(axis=1))
+    unknowns, mean, pivot_motion = unknowns[coupled], csr_array(mean[coupled]), pivot_motion[coupled]
     pivot_terms = csr_array((-W.data[~is_opposite], (W.row[~is_opposite], W.col[~is_opposite])), shape=(m, n))
     pivot_terms = pivot_terms + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
     dofs_of_nodes = unknowns[:, None] // size * size + np.arange(size)
-    row, other = np.nonzero(~np.isin(dofs_of_nodes, unknowns))
-    other_terms = csr_array((pivot_motion[row, other], (row, dofs_of_nodes[row, other])), shape=(len(unknowns), n))
+    row, axis = np.nonzero(~np.isin(dofs_of_nodes, unknowns))
+    other_terms = csr_array((pivot_motion[row, axis], (row, dofs_of_nodes[row, axis])), shape=(len(unknowns), n))
     divisor = pivot_motion[np.arange(len(unknowns)), unknowns % size]
     weights = csr_array(diags_array(1.0 / divisor, format="csr") @ (mean @ pivot_terms - other_terms))
     return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights)

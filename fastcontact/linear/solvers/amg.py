@@ -113,7 +113,7 @@ class Amg(Multigrid, LinearSolver):
         return {
             "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
             "asked": list(self.columns.requests), **self._constrained_by(), "instead": replacement,
-            "lasting": self._reuses_levels[0],
+            "lasting": self._may_reuse_levels[0],
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
@@ -131,7 +131,7 @@ class Amg(Multigrid, LinearSolver):
             return
         if self.replacement is not None:  # The factorisation replaced multigrid after the snapshot was taken.
             self._factor_solver, self.replacement, self.replacement_reason = self.replacement, None, ""
-        self._reuses_levels[0] = snapshot.get("lasting", True)
+        self._may_reuse_levels[0] = snapshot.get("lasting", True)
         restore_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
             self.rebuild(snapshot["precision"])
