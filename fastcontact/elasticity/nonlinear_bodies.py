@@ -250,9 +250,7 @@ class NonlinearBodies:
         size, change : float
             Both are zero if no point yields, or if a cell is inverted in the middle of the step [pressure].
         """
-        flowing = {
-            k: bodies.history[k][..., PLASTIC_STRAIN] > old[..., PLASTIC_STRAIN] for k, old in old_history.items()
-        }
+        flowing = {k: bodies.history[k][..., PLASTIC_STRAIN] > h[..., PLASTIC_STRAIN] for k, h in old_history.items()}
         if not any(points.any() for points in flowing.values()):
             return 0.0, 0.0
         try:

@@ -22,7 +22,7 @@ from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
 from fastcontact.linear.multigrid.local_change import LocalChange, SymmetricChange, sum_of_changes
 from fastcontact.linear.multigrid.matrix import BlockMatrix
-from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, followers
+from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, followers
 from fastcontact.linear.springs import Springs
 
 # Smallest stiffening factor of a node for which the smoother and the coarser levels are corrected, see `stiffened_nodes`.
@@ -136,7 +136,7 @@ class ConstrainedHierarchy:
         following = followers(elimination, nodes, size)
         rounded = following.weights.astype(finest.b.dtype)
         finest.followers = replace(following, weights=rounded, force_weights=rounded)
-        changes = [SymmetricChange.of_equations(self.A, *composed(elimination, following))]
+        changes = [SymmetricChange.of_equations(self.A, *compose(elimination, following))]
         if springs is not None:
             changes.append(SymmetricChange.of_springs(springs.reduced(following.pivots, following.weights), size))
         return changes

@@ -8,7 +8,7 @@ pivots is much stiffer, the nodes of the other side get its stiffness. This has 
 - Motions of aggregates of these nodes and their softer neighbours would move the stiff body, and would have far too much
   energy. Therefore, coarse levels would correct neither side. In corrections from coarser levels, the roles are exchanged:
   the unknowns of the stiffened nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow these unknowns
-  as usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`composed`).
+  as usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`compose`).
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights)
 
 
-def composed(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:
+def compose(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:
     """Return the product T S of the transformations, see `followers`.
 
     Parameters

@@ -209,7 +209,7 @@ def _with_fallback(method: Callable[..., Any]) -> Callable[..., Any]:
                 return method(self, *args, **options)
             except (StallError, TooManyColumnsError) as error:
                 self._solver.give_up(error)
-        return getattr(self._factored, method.__name__)(*args, **options)
+        return getattr(self._factorisation, method.__name__)(*args, **options)
 
     return wrapper
 
@@ -223,7 +223,7 @@ class _Loaded(LoadedMultigrid):
     full_solution = _with_fallback(LoadedMultigrid.full_solution)
 
     @functools.cached_property
-    def _factored(self) -> Loaded:
+    def _factorisation(self) -> Loaded:
         """The factorisation with the same right-hand side."""
         return self._solver.replacement.load(self._f)
 
