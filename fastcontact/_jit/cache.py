@@ -110,6 +110,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
             self.save(self._key(signature, compiled.codegen), compiled._reduce())
 
     def _key(self, signature: Any, codegen: Any) -> Any:
+        """Return the key of a signature, as Numba computes it for a function without free variables."""
         digests = tuple(hashlib.sha256(part).hexdigest() for part in (self._function.__code__.co_code, b""))
         return signature, codegen.magic_tuple(), digests
 
@@ -240,6 +241,7 @@ def _log_once(text: str) -> None:
 
 
 def _digest(content: bytes) -> str:
+    """Return the SHA-256 digest of `content` in hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()
 
 

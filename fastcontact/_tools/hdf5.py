@@ -209,8 +209,9 @@ class DriverFile:
         self._position += size
         return bytes(data)
 
-    def _get(self, start: int, data: bytearray) -> None:
-        self._file.seek(start)
+    def _get(self, offset: int, data: bytearray) -> None:
+        """Fill `data` with bytes of the file from `offset` on; bytes beyond the end of the file are not changed."""
+        self._file.seek(offset)
         view = memoryview(data)
         while view and (count := self._file.readinto(view)):
             view = view[count:]
@@ -226,6 +227,7 @@ class DriverFile:
         return len(data)
 
     def _put(self, offset: int, data: bytes) -> None:
+        """Write `data` to the file from `offset` on."""
         self._file.seek(offset)
         view = memoryview(data)
         while view:

@@ -232,10 +232,10 @@ class Anisotropic(Material):
             i, j = np.unravel_index(asymmetry.argmax(), D.shape)
             raise ModelError(f"the moduli D are not symmetric: D[{i}, {j}] = {D[i, j]:g} and D[{j}, {i}] = {D[j, i]:g}")
         D = (D + D.T) / 2.0
-        least = float(np.linalg.eigvalsh(D)[0])
-        if not least > 1e-14 * np.abs(D).max():
+        smallest = float(np.linalg.eigvalsh(D)[0])
+        if not smallest > 1e-14 * np.abs(D).max():
             raise ModelError(
-                f"the moduli D are not positive definite: their smallest eigenvalue is {least:.6g}, so that the elastic "
+                f"the moduli D are not positive definite: their smallest eigenvalue is {smallest:.6g}, so that the elastic "
                 "energy is not positive for every strain; check the order of the components, 11, 22, 33, 12, 23, 13"
             )
         object.__setattr__(self, "D", tuple(tuple(row) for row in D.tolist()))

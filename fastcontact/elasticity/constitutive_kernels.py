@@ -328,10 +328,10 @@ def _saint_venant(D, F, tangent, P, A):
 
 
 @innermost_kernel
-def _add_isochoric(value, first, number, power, scale, J, G, dW, d2W, tangent, P, A):
+def _add_isochoric(value, derivative, number, power, scale, J, G, dW, d2W, tangent, P, A):
     """Add to P and A the terms of a function of the isochoric invariant ``scale * value``, except for second derivatives.
 
-    `scale` is ``J**-power``, and `first` (3, 3) is the derivative of the value. `dW` and `d2W` are the first and second
+    `scale` is ``J**-power``, and `derivative` (3, 3) is that of the value. `dW` and `d2W` are the first and second
     derivatives of the energy with respect to the invariant. The terms of A are stored in the rows LEFT, ``LEFT + number``
     and ``RIGHT + number``, see `first_invariant`. Returns the factors of the second derivatives of the value and of J.
     """
@@ -340,13 +340,13 @@ def _add_isochoric(value, first, number, power, scale, J, G, dW, d2W, tangent, P
     curvature, mixed = d2W * scale * scale, factor * inverse
     for i in range(3):
         for j in range(3):
-            change = first[i, j] - ratio * G[i, j]
+            change = derivative[i, j] - ratio * G[i, j]
             P[i, j] += factor * change
             if tangent:
                 e = 3 * i + j
-                A[RIGHT + number, e] = first[i, j]
+                A[RIGHT + number, e] = derivative[i, j]
                 A[LEFT + number, e] = curvature * change - mixed * G[i, j]
-                A[LEFT, e] += GG_factor * G[i, j] - mixed * first[i, j] - curvature * ratio * change
+                A[LEFT, e] += GG_factor * G[i, j] - mixed * derivative[i, j] - curvature * ratio * change
     return factor, -factor * ratio
 
 
@@ -407,14 +407,14 @@ def _second_invariant(C01, I1, scale, F, J, G, factor, d2J_factor, tangent, P, A
 
     `factor` and `d2J_factor` are results of `first_invariant`.
     """
-    C, first, square = np.empty((3, 3)), np.empty((3, 3)), 0.0
+    C, derivative, square = np.empty((3, 3)), np.empty((3, 3)), 0.0
     right_cauchy_green(F, C)
     for i in range(3):
         for j in range(3):
-            first[i, j] = I1 * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j]
+            derivative[i, j] = I1 * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j]
             square += C[i, j] ** 2
     I2 = 0.5 * (I1 * I1 - square)
-    I2_factor, J_factor = _add_isochoric(0.5 * I2, first, 2, 4.0 / 3.0, scale, J, G, 2.0 * C01, 0.0, tangent, P, A)
+    I2_factor, J_factor = _add_isochoric(0.5 * I2, derivative, 2, 4.0 / 3.0, scale, J, G, 2.0 * C01, 0.0, tangent, P, A)
     sum_products(3, factor + I2_factor * I1, d2J_factor + J_factor, tangent, F, A)
     for i in range(3 if tangent else 0):
         for j in range(3):

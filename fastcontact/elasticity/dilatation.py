@@ -70,7 +70,7 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     return Split(deviatoric, np.column_stack([bulk, bulk_remainder]))
 
 
-def projected(name: str, coordinates: Array, values: Array, xi: Array, axisymmetric: bool) -> Array:
+def project_field(name: str, coordinates: Array, values: Array, xi: Array, axisymmetric: bool) -> Array:
     """Return the mean and the remainder (n_cells, 2, n) of a field, projected like the dilatation [unit of the field].
 
     Parameters

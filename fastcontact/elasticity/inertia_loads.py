@@ -34,11 +34,11 @@ class Densities:
         density = np.full((len(rows), len(N)), np.nan)
         number_of_row = self.number[name][rows]
         for number, material in enumerate(self.materials):
-            cells = np.flatnonzero(number_of_row == number)
+            members = np.flatnonzero(number_of_row == number)
             if isinstance(material.density, Varying):
-                density[cells] = material.density.at(name, rows[cells], N).reshape(len(cells), len(N))
+                density[members] = material.density.at(name, rows[members], N).reshape(len(members), len(N))
             elif material.density is not None:
-                density[cells] = material.density
+                density[members] = material.density
         return density
 
 

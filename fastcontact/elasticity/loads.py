@@ -35,9 +35,9 @@ EVERYWHERE = "all solid cells"
 LARGEST = 1e60
 Components = Mapping[int, Value]
 
-# Number of points of the product rule in each direction, and its number in the Cartesian directions of squares, cubes and
-# prisms. The rules are exact at least to degree 7, which suffices for constant loads on curved quadratic cells in axisymmetry
-# and for quadratic loads on straight facets.
+# Number of points of the product rule in each direction of lines, triangles, tetrahedra and pyramids, and in the Cartesian
+# directions of squares, cubes and prisms; see `quadrature.product_rule`. The rules are exact at least to degree 7, which
+# suffices for constant loads on curved quadratic cells in axisymmetry and for quadratic loads on straight facets.
 LOAD_POINTS = 5, 4
 
 

@@ -83,7 +83,7 @@ class NonlinearBodies:
         size = field.moduli.shape[1]
         self._moduli, self._expansion = np.zeros((len(field.moduli), 6, 6)), np.zeros((len(field.moduli), 6))
         self._moduli[:, :size, :size], self._expansion[:, :size] = field.moduli, np.nan_to_num(field.expansion)
-        self._cells = {name: _at_points(field.moduli_rows[name], name) for name in mesh.solids}
+        self._cells = {name: _rows_at_points(field.moduli_rows[name], name) for name in mesh.solids}
         self._averaged = field.averaged & (kinematics != "plane_stress")
         self._constants = self._constants_of_laws()
         self._pattern: Sparsity = sparsity(mesh)
@@ -250,10 +250,8 @@ class NonlinearBodies:
         size, change : float
             Both are zero if no point yields, or if a cell is inverted in the middle of the step [pressure].
         """
-        yielding = {
-            k: bodies.history[k][..., PLASTIC_STRAIN] > old[..., PLASTIC_STRAIN] for k, old in old_history.items()
-        }
-        if not any(points.any() for points in yielding.values()):
+        flowing = {k: bodies.history[k][..., PLASTIC_STRAIN] > h[..., PLASTIC_STRAIN] for k, h in old_history.items()}
+        if not any(points.any() for points in flowing.values()):
             return 0.0, 0.0
         try:
             halved_bodies = self.at(end, self.at(middle, old_history, tangent=False).history, tangent=False)
@@ -261,7 +259,7 @@ class NonlinearBodies:
             return 0.0, 0.0
         twice_shear = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # in the norm of a tensor
         stress, halved_stress = (
-            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in yielding.items()])
+            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in flowing.items()])
             for response in (bodies, halved_bodies)
         )
         return float(np.linalg.norm(stress)), float(np.linalg.norm(halved_stress - stress))
@@ -361,7 +359,7 @@ def check_law(law: Material, strain: str) -> None:
         raise ModelError(f"a nearly incompressible material ({law.described}) locks at finite strains: use {example}")
 
 
-def _at_points(numbers: Numbers, name: str) -> Numbers:
+def _rows_at_points(numbers: Numbers, name: str) -> Numbers:
     """Return the row of moduli of each quadrature point (n_cells, n_q), given the rows of cells or of quadrature points."""
     n_q = len(elements.get(name).quadrature[1])
     columns = numbers[:, None] if numbers.ndim == 1 else numbers

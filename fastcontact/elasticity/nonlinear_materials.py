@@ -1,8 +1,8 @@
 """Nonlinear material laws: von Mises plasticity, and hyperelasticity at finite strains.
 
 For `constitutive_kernels`, a law is a row of constants: the number of the law, the shear modulus, the bulk modulus of the
-volumetric part ``U(J) = K (J - 1)^2 / 2``, and further constants. Other modules, such as those of
-loads and contact, use the isotropic moduli at small strains.
+volumetric part ``U(J) = K (J - 1)^2 / 2``, and further constants. Other modules, such as those of loads and contact, use the
+isotropic moduli at small strains.
 """
 
 from __future__ import annotations

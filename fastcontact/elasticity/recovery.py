@@ -128,14 +128,9 @@ class CellStress:
             out[portion] = _varying_product(moduli, name, xi, material[portion], strain[portion])
 
     def _add_modes(
-        self,
-        location: tuple[str, Array, Array],
-        with_modes: Mask,
-        cells: Numbers,
-        material: Numbers,
-        out: Array,
+        self, location: tuple[str, Array, Array], with_modes: Mask, cells: Numbers, material: Numbers, out: Array,
         rows: Indices,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Add the stresses due to incompatible modes, for the moduli that are marked in `with_modes` (n_materials,)."""
         from fastcontact.elasticity import incompatible_modes_kernels
 
@@ -189,7 +184,7 @@ class CellStress:
         at_points = name, elements.get(name).quadrature[0], rows[is_split]
         strain = self._stress_free_strain(offset, at_points, cells[is_split], material[is_split])
         coordinates = self._mesh.points[cells[is_split]]
-        dilatations = dilatation.projected(name, coordinates, strain[:, :, :3].sum(axis=2), xi, self._axisymmetric)
+        dilatations = dilatation.project_field(name, coordinates, strain[:, :, :3].sum(axis=2), xi, self._axisymmetric)
         out[is_split, :, :3] -= (bulk[is_split][:, :, None] * dilatations).sum(axis=1)[:, :, None]
 
 
@@ -259,7 +254,7 @@ def nodal_stress(
             rows = slice(first, first + size)
             numbers = np.arange(first, min(first + size, len(block)))
             values = stress.at(name, xi, block[rows], material[name][rows], numbers)
-            _add(average, slots[name][rows], element.extrapolation, values)
+            _add_values(average, slots[name][rows], element.extrapolation, values)
     return average.result()
 
 
@@ -294,7 +289,7 @@ class NodalAverage:
         return self._total
 
 
-_add = unchecked(NodalAverage.add)
+_add_values = unchecked(NodalAverage.add)
 
 
 @typed(ModelError)

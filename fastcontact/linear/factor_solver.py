@@ -112,7 +112,7 @@ class FactorSolver(LinearSolver):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
 
-    def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+    def _factorise(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         """Return the factors of K (n, n), with the unknowns `last` (m,) eliminated last; ModelError if K is singular."""
         raise NotImplementedError
 
@@ -128,7 +128,7 @@ class FactorSolver(LinearSolver):
         """
         self.n, self._K, self.refines = K.shape[0], K, False
         last = np.empty(0, np.intp) if involved is None or len(involved) > MAX_LAST_UNKNOWNS else involved
-        self.factors = self._factorised(K, last)
+        self.factors = self._factorise(K, last)
         self.counters.setups += 1
         self.columns, self.known_loads = InverseColumns(self.n, self.factors.inverse_entries), KnownLoads(self.n)
         self.last = last if len(last) else None
@@ -165,7 +165,7 @@ class FactorSolver(LinearSolver):
         self.refines = True
         return True
 
-    def refined(self, f: Array) -> Array:
+    def refined_solution(self, f: Array) -> Array:
         """Return ``K^-1 f`` (n,), with one step of iterative refinement."""
         u = self.back_substitute(f)
         return u + self.back_substitute(f - self._K @ u)
@@ -202,7 +202,7 @@ class LoadedFactor(Loaded):
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
         if self._solver.refines:
-            return self._solver.refined(self._f + force)
+            return self._solver.refined_solution(self._f + force)
         if not force.any():
             return self._unconstrained.copy()
         last = self._solver.last

@@ -124,7 +124,7 @@ def stuck(patch):
 
 def indefinite():
     K = bsr_array(np.array([[1.0, 2.0], [2.0, 1.0]]), blocksize=(1, 1))
-    Direct(tolerance=1e-10)._factorised(K, np.array([1]))
+    Direct(tolerance=1e-10)._factorise(K, np.array([1]))
 
 
 def no_triangulation(patch):

@@ -275,16 +275,16 @@ def _subtract_by_blocks(F: Array, begin: int, end: int, panel: Array, scaled_pan
     """Subtract the contribution of the columns `begin` to ``end - 1`` of L from the rows below by matrix products."""
     size, width = len(F), end - begin
     m = size - end
-    plain, scaled = panel[: m * width].reshape(m, width), scaled_panel[: m * width].reshape(m, width)
+    unscaled, scaled = panel[: m * width].reshape(m, width), scaled_panel[: m * width].reshape(m, width)
     for j in range(width):
         row, pivot = F[begin + j], F[begin + j, begin + j]
         for i in range(m):
-            plain[i, j] = row[end + i]
+            unscaled[i, j] = row[end + i]
             scaled[i, j] = pivot * row[end + i]
     for low in range(0, m, 2 * PANEL):
         high = min(low + 2 * PANEL, m)
         change = product[: (high - low) * (m - low)].reshape(high - low, m - low)
-        np.dot(scaled[low:high], plain[low:].T, change)
+        np.dot(scaled[low:high], unscaled[low:].T, change)
         for i in range(low, high):
             target, source = F[end + i], change[i - low]
             for k in range(i, m):

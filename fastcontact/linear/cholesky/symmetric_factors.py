@@ -66,7 +66,8 @@ class SymmetricFactors:
     def inverse_entries(self, rows: Indices, columns: Indices) -> Array:
         """Return the entries (m, k) of ``K^-1`` in `rows` (m,) and `columns` (k,) [length / force]."""
         row_positions, column_positions = self._position[rows], self._position[columns]
-        # Neighbouring columns of the factors have common ancestors in the elimination tree.
+        # In this order, the columns of a batch share most ancestors in the elimination tree, so that few supernodes are
+        # affected.
         entries, order = np.empty((len(rows), len(columns))), np.argsort(column_positions)
         size = min(BATCH, max(1, self.nnz // self.n))  # the right-hand sides take no more memory than the factors
         for batch in (order[begin : begin + size] for begin in range(0, len(order), size)):

@@ -56,12 +56,12 @@ def forward(start: Offsets, values: Array, first: Offsets, row_start: Offsets, r
         change[:below] = 0.0
         for j in range(low, high):
             xj = x[j]
-            at = start[j] + 1
+            entry = start[j] + 1
             for k in range(j + 1, high):
-                x[k] -= values[at] * xj
-                at += 1
+                x[k] -= values[entry] * xj
+                entry += 1
             for k in range(below):
-                change[k] += values[at + k] * xj
+                change[k] += values[entry + k] * xj
         for k in range(below):
             x[rows[row_start[s] + k]] -= change[k]
 
@@ -116,14 +116,15 @@ def solve_together(
 
     Only the rows `loaded` (n,) of X may have nonzero entries, and d (n,) is the diagonal of D. The forward substitution skips
     supernodes that are not affected by the rows `loaded`, and the backward substitution skips those that do not affect the
-    rows `required` (n,); see `_affected`. Both masks are overwritten, and the other rows of X are undefined afterwards.
+    rows `required` (n,); see `_affected_supernodes`. Both masks are overwritten, and the other rows of X are undefined
+    afterwards.
     """
     max_rows = 0
     for s in range(len(first) - 1):
         max_rows = max(max_rows, first[s + 1] - first[s] + row_start[s + 1] - row_start[s])
     panel, below = np.empty(PANEL * max_rows), np.empty(max_rows, np.int64)
     panel_rows, product = np.empty((max_rows, X.shape[1])), np.empty((PANEL, X.shape[1]))
-    affected = _affected(first, row_start, rows, loaded)
+    affected = _affected_supernodes(first, row_start, rows, loaded)
     for s in range(len(affected)):
         for low in range(first[s], first[s + 1] if affected[s] else first[s], PANEL):
             high = min(low + PANEL, first[s + 1])
@@ -134,7 +135,7 @@ def solve_together(
             np.dot(panel[: (high - low) * size].reshape(high - low, size).T, X[low:high], panel_rows[:size])
             for k in range(size):
                 X[below[k]] -= panel_rows[k]
-    affected = _affected(first, row_start, rows, required)
+    affected = _affected_supernodes(first, row_start, rows, required)
     for s in range(len(affected) - 1, -1, -1):
         for high in range(first[s + 1], first[s] if affected[s] else first[s + 1], -PANEL):
             low = max(high - PANEL, first[s])
@@ -149,7 +150,7 @@ def solve_together(
 
 
 @kernel
-def _affected(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) -> Mask:
+def _affected_supernodes(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) -> Mask:
     """Return which supernodes (n_supernodes,) contain `marked` columns (n,), or have descendants that do.
 
     Descendants and ancestors refer to the elimination tree. All ancestors of marked columns are marked as well.

@@ -89,25 +89,25 @@ def column_inverse(B: csr_array, pivots: Indices, size: int) -> Inverse:
     P = csr_array(B[:, pivots])
     if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MAX_LAYERS)) is not None:
         return inverse
-    largest = np.bincount(connected_components(P, directed=False)[1]).max(initial=0)
-    if largest > LARGEST_BLOCK:
+    block_size = np.bincount(connected_components(P, directed=False)[1]).max(initial=0)
+    if block_size > LARGEST_BLOCK:
         try:
             return CoupledPivots(P, pivots, size)
         except CoupledError:
             if (inverse := _triangular_inverse(P, LARGEST_DENSE, 2 * MAX_LAYERS)) is not None:
                 return inverse
-            if largest > LARGEST_DENSE:
+            if block_size > LARGEST_DENSE:
                 raise
     return SparseInverse(block_inverse(P))
 
 
-def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInverse | None:
+def _triangular_inverse(P: csr_array, max_block_size: int, max_terms: int) -> SparseInverse | None:
     """Return the inverse of P (m, m) if P is block triangular after a permutation, None otherwise.
 
-    The diagonal blocks must have at most `largest` rows, and the inverse must be a sum of at most `layers` terms.
+    The diagonal blocks must have at most `max_block_size` rows, and the inverse must be a sum of at most `max_terms` terms.
     """
     label = connected_components(P, connection="strong")[1]
-    if np.bincount(label).max(initial=0) > largest:
+    if np.bincount(label).max(initial=0) > max_block_size:
         return None
     in_diagonal_block = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
     values = (np.where(mask, P.data, 0.0) for mask in (in_diagonal_block, ~in_diagonal_block))
@@ -116,7 +116,7 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
     off_diagonal.eliminate_zeros()
     # The inverse of a block triangular matrix is a finite Neumann series.
     total = term = diagonal_inverse = block_inverse(diagonal)
-    for _ in range(layers):
+    for _ in range(max_terms):
         term = csr_array(-(diagonal_inverse @ off_diagonal @ term))
         if not term.nnz:
             return SparseInverse(total)

@@ -31,10 +31,10 @@ def stretch_dot(a, b, low, high):
 @kernel
 def total(sums):
     """Return the total of the `sums` of the chunks, which are added in ascending order."""
-    total = 0.0
+    result = 0.0
     for k in range(sums.shape[0]):
-        total += sums[k]
-    return total
+        result += sums[k]
+    return result
 
 
 @kernel

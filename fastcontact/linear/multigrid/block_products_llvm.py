@@ -152,9 +152,9 @@ class _Writer:
         if width == 1:
             return number
         undefined = ir.Constant(ir.VectorType(number.type, width), ir.Undefined)
-        return self.shuffled(self.builder.insert_element(undefined, number, self.lane(0)), [0] * width)
+        return self.shuffle(self.builder.insert_element(undefined, number, self.lane(0)), [0] * width)
 
-    def shuffled(self, vector: Any, lanes: list[int]) -> Any:
+    def shuffle(self, vector: Any, lanes: list[int]) -> Any:
         """Return the vector that consists of the given `lanes` of `vector`."""
         order = ir.Constant(ir.VectorType(self.lane, len(lanes)), lanes)
         return self.builder.shuffle_vector(vector, vector, order)
@@ -197,7 +197,7 @@ class _Row(_Writer):
         j = builder.mul(column, self.offset(n))
         at = builder.mul(k, self.offset(m * n))
         x_j = self._triple(j) if self.shifted else [self.load([self.x], j, p.column, p.width) for p in self.pieces]
-        x_of_last = [self.shuffled(x_j[0], [0, 0, 1, 2])] if self.shifted else x_j
+        x_of_last = [self.shuffle(x_j[0], [0, 0, 1, 2])] if self.shifted else x_j
         for r in range(m):
             last = self.shifted and r == m - 1
             inputs = x_of_last if last else x_j
@@ -233,7 +233,7 @@ class _Row(_Writer):
 
     def _triple(self, j: Any) -> list[Any]:
         """Return the three numbers of x from j on and an arbitrary fourth one, without reading beyond them."""
-        pair = self.shuffled(self.load([self.x], j, 0, 2), [0, 1, 0, 1])
+        pair = self.shuffle(self.load([self.x], j, 0, 2), [0, 1, 0, 1])
         return [self.builder.insert_element(pair, self.load([self.x], j, 2, 1), self.lane(2))]
 
 
@@ -250,7 +250,7 @@ class _RowBothWays(_Row):
     def process(self, r: int, p: int, vector: Any, last: bool) -> None:
         """Add row r of the block, times `factor` and the entry of x in row r of the block row."""
         if last:
-            vector = self.shuffled(vector, [1, 2, 3, 3])
+            vector = self.shuffle(vector, [1, 2, 3, 3])
         width = self.pieces[p].width
         if r == 0:
             self.added.append(self.zeros(width))
@@ -262,7 +262,7 @@ class _RowBothWays(_Row):
             if piece.used == piece.width:
                 self.add(self.y, j, piece.column, piece.width, vector)
             else:
-                self.add(self.y, j, piece.column, 2, self.shuffled(vector, [0, 1]))
+                self.add(self.y, j, piece.column, 2, self.shuffle(vector, [0, 1]))
                 self.add(self.y, j, piece.column + 2, 1, self.builder.extract_element(vector, self.lane(2)))
         self.added = []
 

@@ -22,7 +22,7 @@ from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
 from fastcontact.linear.multigrid.local_change import LocalChange, SymmetricChange, sum_of_changes
 from fastcontact.linear.multigrid.matrix import BlockMatrix
-from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, followers
+from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, followers
 from fastcontact.linear.springs import Springs
 
 # Smallest stiffening factor of a node for which the smoother and the coarser levels are corrected, see `stiffened_nodes`.
@@ -89,7 +89,7 @@ class ConstrainedHierarchy:
             self.hierarchy.coarse.set(csc_array(sum(change.matrix() for change in changes)))
             return
         diagonals = [change.diagonal() for change in changes]
-        stiffened = None if elimination is None else self._stiffened(diagonals[0], elimination)
+        stiffened = None if elimination is None else self._stiffened_nodes(diagonals[0], elimination)
         self._change_diagonal(finest, sum_of_changes(*diagonals))
         if elimination is not None and stiffened is not None and len(stiffened):
             changes = self._exchange_roles(elimination, springs, stiffened, diagonals[1:])
@@ -111,14 +111,14 @@ class ConstrainedHierarchy:
             level.eliminated = level.change = level.springs = None
             level.followers = level.free_motions = None
 
-    def _stiffened(self, change: LocalChange, elimination: Elimination) -> Indices:
+    def _stiffened_nodes(self, change: LocalChange, elimination: Elimination) -> Indices:
         """Return the nodes without pivots that equations stiffen by more than SMALLEST_STIFFENING, and set `stiffening`.
 
         `change` is the change of the diagonal blocks due to the equations.
         """
         size = change.size
-        before = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
-        trace, added = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (before, change.diagonal()))
+        old = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
+        trace, added = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (old, change.diagonal()))
         factors = np.divide(added, trace, out=np.zeros(len(added)), where=trace > 0.0)
         self.stiffening = float(factors.max(initial=0.0))
         return change.nodes[(factors > SMALLEST_STIFFENING) & ~np.isin(change.nodes, elimination.pivots // size)]
@@ -136,7 +136,7 @@ class ConstrainedHierarchy:
         following = followers(elimination, nodes, size)
         rounded = following.weights.astype(finest.b.dtype)
         finest.followers = replace(following, weights=rounded, force_weights=rounded)
-        changes = [SymmetricChange.of_equations(self.A, *composed(elimination, following))]
+        changes = [SymmetricChange.of_equations(self.A, *compose(elimination, following))]
         if springs is not None:
             changes.append(SymmetricChange.of_springs(springs.reduced(following.pivots, following.weights), size))
         return changes

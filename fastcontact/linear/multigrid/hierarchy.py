@@ -61,7 +61,7 @@ class Hierarchy:
         while True:
             level = self._level(A)
             self.levels.append(level)
-            coarser = self._coarsened(A, level, modes) if level.n > COARSEST_SIZE else None
+            coarser = self._coarsen(A, level, modes) if level.n > COARSEST_SIZE else None
             if coarser is None:
                 break
             level.P, level.R, A, modes = coarser
@@ -97,7 +97,7 @@ class Hierarchy:
         level.bound = SAFETY_FACTOR * largest_eigenvalue(level)
         return level
 
-    def _coarsened(
+    def _coarsen(
         self, A: BlockMatrix, level: Level, modes: Array
     ) -> tuple[BlockMatrix, BlockMatrix, BlockMatrix, Array] | None:
         """Return the prolongator, its transpose, the coarse matrix and its modes; None if aggregation stagnates."""

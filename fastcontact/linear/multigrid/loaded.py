@@ -51,7 +51,7 @@ class LoadedMultigrid(LoadedIteration):
                 if isinstance(C, FieldCompliance):
                     equations = _DividedFieldEquations.from_points(B, c, C, self._solver.K.blocksize[0])
                 else:
-                    equations = self._divided(B, c, C, nodes)
+                    equations = self._divide(B, c, C, nodes)
             except DependenceError as error:
                 log.info("%s (the Delassus operator is formed instead)", error)
         if equations is None:
@@ -72,7 +72,7 @@ class LoadedMultigrid(LoadedIteration):
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `LoadedNonsymmetric`."""
-        equations = self._divided(B, c, C, nodes, None if friction is None else friction.rows)
+        equations = self._divide(B, c, C, nodes, None if friction is None else friction.rows)
         if friction is None:
             return self._solution(equations, c, guess, None, tolerance)
         solver, elimination, springs = self._solver, equations.elimination, equations.springs
@@ -110,7 +110,7 @@ class LoadedMultigrid(LoadedIteration):
         multipliers = np.concatenate([solver.multiplier(elimination, u, f, springs), at_edge])
         return u, equations.multiplier(u, multipliers, c)
 
-    def _divided(
+    def _divide(
         self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, force_rows: csr_array | None = None
     ) -> _DividedEquations:
         """Return the equations, divided into eliminated ones and springs.
@@ -159,7 +159,7 @@ class _DividedEquations:
     ) -> _DividedEquations:  # fmt: skip
         """Return the equations ``B u + C multiplier = c``, of which those marked in `stiff` (m,) are eliminated.
 
-        For parameters see `eliminate` and `LoadedMultigrid._divided`. A DependenceError is raised if the eliminated equations
+        For parameters see `eliminate` and `LoadedMultigrid._divide`. A DependenceError is raised if the eliminated equations
         are linearly dependent.
         """
         rows, elimination = np.flatnonzero(stiff), None

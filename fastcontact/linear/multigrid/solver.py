@@ -112,11 +112,12 @@ class Multigrid:
         self._earlier_hierarchy: Hierarchy | None = None
         self._reuses_coarse_levels = False
         # Whether coarser levels may be reused; the list is shared by all copies.
-        self._reuses_levels = [True]
+        self._may_reuse_levels = [True]
         self.begin()
 
     def begin(self) -> None:
         """Reset the statistics of warm starts for a new load step."""
+        # Residual norm of the last initial guess after which the iteration stopped at the largest number of warm iterations.
         self._max_warm_iterations, self._unfinished_norm = MAX_WARM_ITERATIONS, np.inf
         self._change_rate = np.inf  # change of displacements in an iteration, divided by the decrease of the residual
 
@@ -142,7 +143,7 @@ class Multigrid:
         Once the iteration converges slowly with reused levels, all hierarchies are built anew.
         """
         new = copy.copy(self)
-        new._earlier_hierarchy = self.hierarchy if self._reuses_levels[0] else None
+        new._earlier_hierarchy = self.hierarchy if self._may_reuse_levels[0] else None
         return new
 
     def _build(self, rigid_modes: Array, earlier: Hierarchy | None = None) -> None:
@@ -159,7 +160,7 @@ class Multigrid:
 
     def _build_anew(self) -> None:
         """Build all levels of the hierarchy, now and for all later matrices."""
-        self._reuses_levels[0], reduced = False, self._reduced
+        self._may_reuse_levels[0], reduced = False, self._reduced
         self._build(self._modes.astype(float))
         self._add_work(COST_OF_CHANGE)
         self.constrain(reduced.elimination, reduced.springs)

@@ -8,7 +8,7 @@ pivots is much stiffer, the nodes of the other side get its stiffness. This has 
 - Motions of aggregates of these nodes and their softer neighbours would move the stiff body, and would have far too much
   energy. Therefore, coarse levels would correct neither side. In corrections from coarser levels, the roles are exchanged:
   the unknowns of the stiffened nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow these unknowns
-  as usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`composed`).
+  as usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`compose`).
 """
 
 from __future__ import annotations
@@ -85,25 +85,25 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     opposite, stiffened = np.ones(n // size, bool), np.zeros(n // size, bool)
     opposite[pivots // size], stiffened[nodes] = False, True
     is_opposite, direction = opposite[W.col // size], W.col % size
-    follows = stiffened[W.col // size] & (direction == (pivots % size)[W.row]) & (W.data > 0.0)
-    unknowns, column = np.unique(W.col[follows], return_inverse=True)
-    mean = csr_array((W.data[follows], (column, W.row[follows])), shape=(len(unknowns), m))
+    is_follower = stiffened[W.col // size] & (direction == (pivots % size)[W.row]) & (W.data > 0.0)
+    unknowns, column = np.unique(W.col[is_follower], return_inverse=True)
+    mean = csr_array((W.data[is_follower], (column, W.row[is_follower])), shape=(len(unknowns), m))
     # Displacement of each pivot due to unit translations of the opposite side along each direction.
     translation = csr_array((W.data[is_opposite], (W.row[is_opposite], direction[is_opposite])), shape=(m, size))
     pivot_motion = np.asarray((mean @ translation).toarray())
-    couples = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= SMALLEST_MOTION * np.asarray(mean.sum(axis=1))
-    unknowns, mean, pivot_motion = unknowns[couples], csr_array(mean[couples]), pivot_motion[couples]
+    coupled = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= SMALLEST_MOTION * np.asarray(mean.sum(axis=1))
+    unknowns, mean, pivot_motion = unknowns[coupled], csr_array(mean[coupled]), pivot_motion[coupled]
     pivot_terms = csr_array((-W.data[~is_opposite], (W.row[~is_opposite], W.col[~is_opposite])), shape=(m, n))
     pivot_terms = pivot_terms + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
     dofs_of_nodes = unknowns[:, None] // size * size + np.arange(size)
-    row, other = np.nonzero(~np.isin(dofs_of_nodes, unknowns))
-    other_terms = csr_array((pivot_motion[row, other], (row, dofs_of_nodes[row, other])), shape=(len(unknowns), n))
+    row, axis = np.nonzero(~np.isin(dofs_of_nodes, unknowns))
+    other_terms = csr_array((pivot_motion[row, axis], (row, dofs_of_nodes[row, axis])), shape=(len(unknowns), n))
     divisor = pivot_motion[np.arange(len(unknowns)), unknowns % size]
     weights = csr_array(diags_array(1.0 / divisor, format="csr") @ (mean @ pivot_terms - other_terms))
     return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights)
 
 
-def composed(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:
+def compose(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:
     """Return the product T S of the transformations, see `followers`.
 
     Parameters

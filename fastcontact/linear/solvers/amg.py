@@ -113,7 +113,7 @@ class Amg(Multigrid, LinearSolver):
         return {
             "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
             "asked": list(self.columns.requests), **self._constrained_by(), "instead": replacement,
-            "lasting": self._reuses_levels[0],
+            "lasting": self._may_reuse_levels[0],
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
@@ -131,7 +131,7 @@ class Amg(Multigrid, LinearSolver):
             return
         if self.replacement is not None:  # The factorisation replaced multigrid after the snapshot was taken.
             self._factor_solver, self.replacement, self.replacement_reason = self.replacement, None, ""
-        self._reuses_levels[0] = snapshot.get("lasting", True)
+        self._may_reuse_levels[0] = snapshot.get("lasting", True)
         restore_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
             self.rebuild(snapshot["precision"])
@@ -209,7 +209,7 @@ def _with_fallback(method: Callable[..., Any]) -> Callable[..., Any]:
                 return method(self, *args, **options)
             except (StallError, TooManyColumnsError) as error:
                 self._solver.give_up(error)
-        return getattr(self._factored, method.__name__)(*args, **options)
+        return getattr(self._factorisation, method.__name__)(*args, **options)
 
     return wrapper
 
@@ -223,7 +223,7 @@ class _Loaded(LoadedMultigrid):
     full_solution = _with_fallback(LoadedMultigrid.full_solution)
 
     @functools.cached_property
-    def _factored(self) -> Loaded:
+    def _factorisation(self) -> Loaded:
         """The factorisation with the same right-hand side."""
         return self._solver.replacement.load(self._f)
 

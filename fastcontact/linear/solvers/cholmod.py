@@ -23,7 +23,7 @@ class Cholmod(FactorSolver):
 
     name = "cholmod"
 
-    def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+    def _factorise(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         from kvxopt import cholmod, matrix
 
         factor = factorise(lower_triangle(K.tocsr()), matrix(fill_reducing_order(K, last)))  # rows are columns

@@ -29,7 +29,7 @@ class Direct(FactorSolver):
             return "Direct(not prepared)"
         return f"Direct(Cholesky, {self.n} unknowns, {self.factors.nnz} entries, {self.factors.nbytes / 1e6:.1f} MB)"
 
-    def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+    def _factorise(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         symbolic = self._symbolic.get(self._of_tangents)
         if symbolic is None or not symbolic.matches(K, last):
             symbolic = self._symbolic[self._of_tangents] = SymbolicFactors(K, last, self._of_tangents)

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import csr_array
 
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, followers
+from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, followers
 
 SIZE, PIVOTS, OPPOSITE, FREE = 3, 12, 25, 10
 N = (PIVOTS + OPPOSITE + FREE) * SIZE
@@ -69,7 +69,7 @@ def test_both_sides_translate_together_where_stiffened_nodes_follow(directions, 
     following = followers(elimination, NODES, SIZE)
     assert set(following.pivots % SIZE) == set(directions)
     assert len(following.pivots) > 0.7 * OPPOSITE * len(directions)
-    pivots, weights = composed(elimination, following)
+    pivots, weights = compose(elimination, following)
     both = matrix(elimination.pivots, elimination.weights) @ matrix(following.pivots, following.weights)
     assert np.allclose(matrix(pivots, weights), both)
     # The pivots' side decides: where it moves and the other lies still, that follows.
