@@ -205,7 +205,7 @@ class SegmentMortar(PressureFieldFormulation):
         points = line_points(block, self.primary, self.points, deformed, *options)
         facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(block.facets[facet], shape, facet, points.xi[:, None])
-        pairing_of_points = self.facing(candidates, config)
+        pairing_of_points = self.pair_candidates(candidates, config)
         paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))

@@ -15,7 +15,7 @@ import numpy as np
 
 from fastcontact._tools.argument_types import check_fields, typed
 from fastcontact.arrays import Mask
-from fastcontact.contact.default_formulation import against_obstacle, default_formulation
+from fastcontact.contact.default_formulation import default_against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.found_contacts import FoundContacts, find_contacts, no_contacts_message
 from fastcontact.contact.held_motions import HeldMotions
@@ -325,7 +325,7 @@ class ModelContact(ModelConnections):
         chosen: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             kinds = self._facet_kinds(secondary)
-            formulation, chosen, reason = against_obstacle(self.mesh.dim, *kinds, chosen)
+            formulation, chosen, reason = default_against_obstacle(self.mesh.dim, *kinds, chosen)
             log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
         if formulation == "mortar":
             chosen.setdefault("multipliers", "dual")
@@ -405,7 +405,7 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
         available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in common)]
         available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
