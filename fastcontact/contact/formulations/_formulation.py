@@ -464,15 +464,14 @@ class Formulation(ABC):
             Minus the motion of a rigid primary side in the step; between two bodies, minus the tangential displacement that
             closes the gap, if `slip` is ``"symmetric"`` [length].
         """
-        rows, slip0 = list[csr_array](), np.zeros((len(directions), len(pairing.paired)))
-        for tangent in directions:
-            rows.append(rows_along(tangent, candidates, pairing, self.primary, self.points.size))
+        rows = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
+        slip0 = np.zeros((len(directions), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
             obstacle_motion = self.rigid_motion(candidates, config)
             slip0 = -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
         elif self.slip == "symmetric":
             slip0 = self._closing_slip(candidates, pairing, directions, config)
-        return tuple(rows), slip0
+        return rows, slip0
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
