@@ -24,7 +24,6 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import stability_ratio
 from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.found_contacts import LARGEST_MODULUS_RATIO
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
@@ -32,7 +31,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
-from fastcontact.elasticity.mass import portions
+from fastcontact.elasticity.mass import cell_portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.elasticity.recovery import BATCH
@@ -364,7 +363,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     In linear kinematics it is half the curl of the displacement (n_points, dim).
     """
     square, point = 0.0, np.zeros(mesh.dim)
-    for name, rows in portions(mesh):
+    for name, rows in cell_portions(mesh):
         element, nodes = elements.get(name), mesh.cells[name][rows]
         centre = element.nodes[: element.n_corners].mean(axis=0)[None]
         slopes, _ = slopes_at(displacement[nodes], mesh.points[nodes], element.gradient(centre))
@@ -376,7 +375,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 def _open_clearances(problem: Problem, state: State) -> set[str]:
     """Return the names of automatically detected pairs that begin open and never close, such as a shank in its hole."""
-    gap_by_pair = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
+    gap_by_pair = {pair.name: pair.detected_gap for pair in problem.model.contact if pair.detected_gap is not None}
     if not state.touched & gap_by_pair.keys():
         return set()
     least_gap = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
@@ -514,10 +513,12 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
 
 def _oscillation_remedy(pair: Formulation, model: Model) -> str:
     """Return the remedy for oscillating pressures of a pair."""
+    from fastcontact.contact.found_contacts import NOTABLE_MODULUS_RATIO
+
     side, primary = pair.secondary, pair.primary
     if isinstance(primary, Surface):
         modulus, other = (_modulus(model, surface.points) for surface in (side, primary))
-        if modulus > LARGEST_MODULUS_RATIO * other:
+        if modulus > NOTABLE_MODULUS_RATIO * other:
             return f"exchange the sides, since the body of '{primary.group}' is softer"
     if pair.name != "mortar":
         return "use formulation mortar"

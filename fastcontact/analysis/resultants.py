@@ -27,13 +27,15 @@ from fastcontact.results.step import ContactResult, StepResult
 
 @typed(ContactError)
 def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Array:
-    """Return the moment of the contact forces on the secondary side about a point, in the reference configuration.
+    """Return the moment of the contact forces on the secondary side about a point.
+
+    In finite strain, the forces act at the deformed positions of the nodes, otherwise at their reference coordinates.
 
     Parameters
     ----------
     contact : ContactResult
     about : array_like (dim,), optional
-        Point of reference, by default the middle of the contact [length].
+        Point of reference, by default the middle of the contact, in finite strain displaced like the nearest node [length].
 
     Returns
     -------
@@ -60,10 +62,14 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
     >>> fc.contact_moment(steps[-1].contact["joint"], about=(0.0, 5.0)).round(6)
     array([100.])
     """
-    centre = contact.middle if about is None else np.asarray(about, float)
+    if about is None:
+        nearest = np.abs(contact.place).argmin()
+        centre = contact.middle + (contact.positions - contact.coordinates)[nearest]
+    else:
+        centre = np.asarray(about, float)
     if centre.shape != (contact.coordinates.shape[1],) or not np.isfinite(centre).all():
         raise ContactError(f"the moment of contact '{contact.name}' about {about!r} needs one number per dimension")
-    arm, force = contact.coordinates - centre, contact.force_vectors
+    arm, force = contact.positions - centre, contact.force_vectors
     if arm.shape[1] == 2:
         return np.array([float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum())])
     return np.asarray(np.cross(arm, force).sum(axis=0))
@@ -86,8 +92,8 @@ class ContactResultants:
         along the edge, and it is usually too large: in 3D by 6 % with 9 facets across the radius, and by 18 % with 4.
         Mortar contact between bodies leaves out the parts of facets without an opposite side.
     centre : ndarray (dim,)
-        Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry its radial component is NaN,
-        since the resultant acts along the axis.
+        Centre of pressure of the normal forces, in finite strain on the deformed surface; NaN without contact [length]. In
+        axisymmetry its radial component is NaN, since the resultant acts along the axis.
     normal_force : float
         Sum of the nodal forces, each along its own normal [force]. Multiplied by the coefficient of friction, it is
         the friction capacity of a press fit, whose resultant force vanishes.
@@ -195,7 +201,7 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
     normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     normal_forces = np.einsum("nd,nd->n", contact.force_vectors, normal)
     total, area = float(normal_forces.sum()), float(areas[closed].sum())
-    in_compression, x = bool(total > 0.0), contact.coordinates
+    in_compression, x = bool(total > 0.0), contact.positions
     moment = contact_moment(contact)
     centre = normal_forces @ x / total if in_compression else np.full(x.shape[1], np.nan)
     if axisymmetric:

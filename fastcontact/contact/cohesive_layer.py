@@ -17,7 +17,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.cohesion import INITIATION_RATIO, Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.round_off import DIFFERENCES, SINGLE_PRECISION, TINY
+from fastcontact.round_off import DIFFERENCE_STEP, SINGLE_PRECISION, TINY
 
 # Stiffness of the linearised layer where it softens, relative to that of the intact layer. It is approximately the ratio of
 # the magnitudes of the two slopes of the default law. With a smaller ratio, the iteration for a beam glued at its nodes does
@@ -141,7 +141,9 @@ def cohesive_rows(
     intact, separation = damage < 1.0, np.stack([opening, *slips])
     secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(separation), 1))
     compression = max(1.0, COMPRESSION_FACTOR * body_stiffness / law.stiffness) if law.reversible else 1.0
-    secant[0, opening < 0.0] = compression
+    # Otherwise the sign of an opening that is round-off would change the branch of the law.
+    stiffened = (opening < 0.0) & (secant[0] != compression)
+    secant[0, stiffened] = compression
     growing = intact & (damage > (0.0 if law.reversible else bond.damage))
     softening = growing & (1.0 - damage > SOFTENING_SLOPE)
     axes, axis = _axes_along(np.where(softening, np.stack([np.maximum(opening, 0.0), *slips]), 0.0))
@@ -171,7 +173,7 @@ def cohesive_rows(
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(separation)),
         compliance=None, tangents=(), directions=(), tied=layer, geometry=lambda *_: Softening(B, correction),
         friction=no_values, slip0=no_values, tangential_softness=no_values, elastic_slip=no_values,
-        low_rank_compliance=no_values, branches=np.where(growing, 1 + axis, 0) + 4 * (opening < 0.0) + 8 * ~intact,
+        low_rank_compliance=no_values, branches=np.where(growing, 1 + axis, 0) + 4 * stiffened + 8 * ~intact,
     ).without(np.concatenate([np.zeros(m, bool), *[~intact] * len(slip0)]))  # fmt: skip
 
 
@@ -188,7 +190,7 @@ def _traction_derivatives(law: CohesiveLaw, separation: Array, compression: floa
         traction[0] = np.where(opening < 0.0, compression * opening, traction[0])
         return traction
 
-    size = DIFFERENCES * np.linalg.norm(separation, axis=0)
+    size = DIFFERENCE_STEP * np.linalg.norm(separation, axis=0)
     steps = np.eye(len(separation))[:, :, None] * size
     return np.stack([(traction(separation + h) - traction(separation - h)) / (2.0 * size) for h in steps], axis=1)
 

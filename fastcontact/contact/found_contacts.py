@@ -27,7 +27,7 @@ EQUALITY_TOLERANCE = 0.1
 # Ratio of moduli above which the softer side is secondary, even if its mesh is coarser. With linear facets twice as fine on
 # the secondary side, pressures of mortar contact alternate by 0.03, 0.06, 0.10 and 0.14 of their mean if the secondary body
 # is 1, 3, 10 and 100 times as stiff as the other one; with the sides exchanged, by 0.01 or less.
-LARGEST_MODULUS_RATIO = 3.0
+NOTABLE_MODULUS_RATIO = 3.0
 _COLUMNS = (
     "contact", "secondary", "primary", "secondary facets", "primary facets", "secondary spacing", "primary spacing",
     "smallest gap", "largest gap", "reason",
@@ -310,7 +310,7 @@ def _secondary(outer: OuterFacets, facet_pairs: Indices, modulus: Array) -> tupl
     """
     moduli = modulus[outer.cell[facet_pairs]].mean(axis=0)
     measures = (
-        ("softer", moduli, 1.0 / LARGEST_MODULUS_RATIO),
+        ("softer", moduli, 1.0 / NOTABLE_MODULUS_RATIO),
         ("finer", _spacing(outer, facet_pairs), 1.0 - EQUALITY_TOLERANCE),
         ("softer", moduli, 1.0 - EQUALITY_TOLERANCE),
         ("smaller", np.array([outer.area[np.unique(side)].sum() for side in facet_pairs.T]), 1.0 - EQUALITY_TOLERANCE),

@@ -40,7 +40,7 @@ from fastcontact.contact.projection import (
 )
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import nodal_rows, rows_of, scaled, shapes_at
-from fastcontact.round_off import DIFFERENCES, TINY
+from fastcontact.round_off import DIFFERENCE_STEP, TINY
 
 
 class NodalNormals:
@@ -60,7 +60,7 @@ class NodalNormals:
 
     def __init__(self, side: Surface, coordinates: Array) -> None:
         self._side, self._coordinates, self.normal = side, coordinates, nodal_normals(side, coordinates)
-        self._step = DIFFERENCES * float(np.ptp(coordinates[side.points], axis=0).max()) / np.sqrt(side.n_facets)
+        self._step = DIFFERENCE_STEP * float(np.ptp(coordinates[side.points], axis=0).max()) / np.sqrt(side.n_facets)
 
     def variation(self, du: Array) -> Array:
         """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length].
@@ -306,7 +306,7 @@ class _ObstaclePoints:
         gap, self.normal, paired, _ = obstacle.project(x, pose)
         self._gap = np.where(paired, gap, 0.0)[:, None]
         self.offset = self._gap * self.normal
-        step = DIFFERENCES * float(np.ptp(coordinates, axis=0).max())
+        step = DIFFERENCE_STEP * float(np.ptp(coordinates, axis=0).max())
         pairs = [[obstacle.project(x + sign * step * axis, pose)[1] for sign in (1, -1)] for axis in np.eye(x.shape[1])]
         self._gradient = np.stack([ahead - behind for ahead, behind in pairs], axis=2) / (2.0 * step)
         self._gradient[~np.isfinite(self._gradient)] = 0.0

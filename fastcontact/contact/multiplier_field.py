@@ -13,7 +13,7 @@ from scipy.sparse.linalg import SuperLU
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
-from fastcontact.linear.delassus import MOST_ROWS
+from fastcontact.linear.delassus import MAX_ROWS
 from fastcontact.linear.field_compliance import FieldCompliance
 
 
@@ -52,7 +52,7 @@ class Projection:
         ContactError
             If the matrix is too large to be factorised.
         """
-        if len(rows) > MOST_ROWS:
+        if len(rows) > MAX_ROWS:
             raise ContactError(
                 f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a "
                 f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='mortar' with "

@@ -135,6 +135,8 @@ def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) ->
     # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
     entries = np.flatnonzero(side.node_weights)  # without repeated nodes
     deviates = np.einsum("pd,pd->p", normal[entries], smooth[entries]) < np.cos(np.radians(0.5 * corner))
+    if not deviates.any():
+        return smooth.reshape(*side.all_local.shape, dim)
     nodes_at_corners = np.unique(node[entries[deviates]])
     by_node = entries[np.argsort(node[entries], kind="stable")]
     start = np.append(0, np.cumsum(np.bincount(node[entries])))

@@ -96,8 +96,9 @@ CONTACT_FIELDS = {
 }
 # Point data that only some models have: heat conduction, wear, cohesive layers or adhesion, and fluid pressures.
 OPTIONAL_FIELDS = ("temperature", "heat_reaction", "contact_wear", "contact_damage", "contact_fluid_pressure")
-# Optional columns of contact tables.
+# Optional columns of contact tables, and optional vectors of contact pairs.
 OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure", "sliding_load")
+OPTIONAL_VECTORS = ("displacement",)
 
 # Number of components of the cell data of models with material interfaces: the nodal stress of the material of a cell,
 # averaged over the nodes of the cell, and its von Mises stress.
@@ -141,15 +142,16 @@ def restart_table(number: int) -> str:
 
 
 def optional_columns(contact: ContactResult) -> tuple[str, ...]:
-    """Return the names of the `OPTIONAL_COLUMNS` for which a pair has values."""
-    return tuple(name for name in OPTIONAL_COLUMNS if getattr(contact, name) is not None)
+    """Return the names of the `OPTIONAL_COLUMNS` and `OPTIONAL_VECTORS` for which a pair has values."""
+    return tuple(name for name in (*OPTIONAL_COLUMNS, *OPTIONAL_VECTORS) if getattr(contact, name) is not None)
 
 
 def contact_row(dim: int, optional: Iterable[str] = ()) -> np.dtype[Any]:
     """Return the data type of the row of a secondary node of a pair at a step; `optional` are its `optional_columns`."""
-    scalars = [(name, "<f8") for name in ("abscissa", "place", "gap", "pressure", "multiplier", *optional)]
     names = ("coordinates", "force_vectors", "normal", "shear", "slip", "slip_total")
-    vectors = [(name, "<f8", (dim,)) for name in names]
+    vectors = [(name, "<f8", (dim,)) for name in (*names, *(name for name in optional if name in OPTIONAL_VECTORS))]
+    optional_scalars = (name for name in optional if name in OPTIONAL_COLUMNS)
+    scalars = [(name, "<f8") for name in ("abscissa", "place", "gap", "pressure", "multiplier", *optional_scalars)]
     return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
 

@@ -13,7 +13,7 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_sides import MaterialSides
-from fastcontact.errors import FastcontactError, ModelError, Suggesting, unknown
+from fastcontact.errors import FastcontactError, ModelError, NameSuggestions, unknown
 from fastcontact.results.units import value_text, with_unit
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -133,7 +133,7 @@ def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactResult(Suggesting):
+class ContactResult(NameSuggestions):
     """State of one contact pair at the end of a load step.
 
     Arrays of length m belong to the m nodes of the secondary side, which are ordered along the surface.
@@ -191,6 +191,8 @@ class ContactResult(Suggesting):
         Torque about the axis of rotation that holds a rotating rigid obstacle in equilibrium. It is equal to the moment of
         the contact forces on the deformable body in the deformed configuration [force times length]; None unless the
         obstacle rotates.
+    displacement : ndarray (m, dim), optional
+        Displacement of the secondary nodes in finite strain, where the contact forces act on the deformed body [length].
     middle : ndarray (dim,)
         Centre of the contact on the reference surface [length]. In axisymmetry it lies on the axis, unless the surface is
         parallel to it or closes on itself, like that of an O-ring; otherwise it is the centre of pressure, moved onto the
@@ -273,6 +275,7 @@ class ContactResult(Suggesting):
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
     heat_flux: Array | None = None
+    displacement: Array | None = None
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -316,6 +319,11 @@ class ContactResult(Suggesting):
     def _repr_html_(self) -> str:
         """Return a table for notebooks."""
         return html_table(self.shown.items(), caption=f"Contact '{self.name}', {self.formulation}")
+
+    @property
+    def positions(self) -> Array:
+        """Positions (m, dim) of the secondary nodes at which forces act: in finite strain the deformed ones [length]."""
+        return self.coordinates if self.displacement is None else self.coordinates + self.displacement
 
     @property
     def measured_from_axis(self) -> bool:
@@ -391,7 +399,7 @@ class ContactsByName(dict[str, ContactResult]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StepResult(Suggesting):
+class StepResult(NameSuggestions):
     """State at the end of one load step.
 
     Attributes
@@ -604,7 +612,7 @@ class StepResult(Suggesting):
 MAX_SHOWN = 30
 
 
-class _Steps(Suggesting):
+class _Steps(NameSuggestions):
     """Base class of lists of steps, whose AttributeError states that an attribute belongs to each step."""
 
     if not TYPE_CHECKING:

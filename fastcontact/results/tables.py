@@ -82,7 +82,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         **_by_axis("shear_", contact.shear),
         **_by_axis("slip_", contact.slip),
         **_by_axis("slip_total_", contact.slip_total),
-        **{name: getattr(contact, name) for name in layout.optional_columns(contact)},
+        **{name: values for name in layout.OPTIONAL_COLUMNS if (values := getattr(contact, name)) is not None},
         "active": contact.active,
         "sticking": contact.sticking,
     }

@@ -465,3 +465,25 @@ def test_bodies_in_space_that_slide_over_their_edges():
     ends = np.array([0.5, 1.0, 1.0, 1.0, 0.5]) / 2.0
     worn = ends @ contact.wear[order].reshape(5, 5) @ ends
     assert worn == pytest.approx(1e-4 * FORCE * 5.0 * np.hypot(0.1, 0.05), rel=0.015)
+
+
+def test_the_moment_in_finite_strain_balances_the_reactions_at_their_deformed_positions(tmp_path):
+    mesh = fc.generate.block((4.0, 2.0), (4, 3), "quad8")
+    model = fc.Model(mesh, kinematics="plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=2.5, nu=0.4))
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=0.5, formulation="mortar")
+    model.prescribe("TOP", x=0.8, y=-0.3)
+    with fc.ResultWriter(tmp_path / "sheared.vtkhdf", model) as writer:
+        for step in fc.solve_steps(model, 2):
+            writer.write(step)
+    stored = fc.open_results(tmp_path / "sheared.vtkhdf")[-1]
+    held = mesh.points_of("TOP")
+    x, force = (mesh.points + step.displacement)[held] - (1.0, 0.5), step.reaction[held]
+    expected = -float((x[:, 0] * force[:, 1] - x[:, 1] * force[:, 0]).sum())
+    assert fc.contact_moment(step.contact["floor"], about=(1.0, 0.5)) == pytest.approx(expected, rel=1e-9)
+    for last in (step, stored):
+        resultant = fc.contact_resultants(model, [last], "floor")[-1]
+        assert resultant.moment == fc.contact_moment(step.contact["floor"])
+        arm = resultant.centre[0] - 1.0  # the floor remains at y = 0
+        assert arm * resultant.force[1] + 0.5 * resultant.force[0] == pytest.approx(expected, rel=1e-9)

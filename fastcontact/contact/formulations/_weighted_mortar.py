@@ -50,7 +50,7 @@ from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements
-from fastcontact.round_off import DIFFERENCES, LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
+from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
 
@@ -276,7 +276,7 @@ class WeightedMortar(Formulation):
 
             sides = np.concatenate([self.secondary.points, self.primary.points])
             motions = displacement, displacement - config.start, displacement - config.displacement
-            step = DIFFERENCES**1.5 * float(np.ptp(self.points[sides], axis=0).max())
+            step = DIFFERENCE_STEP**1.5 * float(np.ptp(self.points[sides], axis=0).max())
             return FiniteDifferences(constraints, constraints_after, (multiplier, tangential), motions, sides, step)
         config, deformed = replace(config, displacement=displacement), self.points + displacement
         coverages = [] if slip_data is None else [coverage for _, coverage in slip_data.substitutions]

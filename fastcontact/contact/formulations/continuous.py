@@ -183,7 +183,7 @@ def _simpson(element: str) -> quadrature.Rule:
         closed = quadrature.triangle_7_closed()
         return closed if reference.order == 1 else quadrature.quartered_triangle(closed)
     line = quadrature.subdivided(quadrature.simpson_line(), reference.order)
-    return line if reference.dim == 1 else quadrature.square(line)
+    return line if reference.dim == 1 else quadrature.tensor_product(line, line)
 
 
 def _at_nodes(element: str) -> quadrature.Rule:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fastcontact.arrays import REFUSAL, Array, Mask, Numbers, is_masked
+from fastcontact.arrays import MASKED_ENTRIES, Array, Mask, Numbers, is_masked
 from fastcontact.contact.obstacles._obstacle import Obstacle
 from fastcontact.errors import ContactError
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -63,7 +63,7 @@ class RigidSide:
         """Return gaps (n,) [length] and normals (n, dim) [-] at `points` (n, dim) [length] before any motion."""
         distance_and_normal = self.obstacle.distance(points)
         if is_masked(distance_and_normal):
-            raise ContactError(f"the distance from a rigid obstacle {REFUSAL}; an infinite gap excludes a point")
+            raise ContactError(f"the distance from a rigid obstacle {MASKED_ENTRIES}; an infinite gap excludes a point")
         if any(np.iscomplexobj(values) for values in distance_and_normal):
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal

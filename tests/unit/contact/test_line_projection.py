@@ -239,7 +239,7 @@ def test_corners_are_taken_one_by_one():
     assert normals == pytest.approx(facet_normals(side.blocks[0], mesh.points), abs=1e-15)
 
 
-@pytest.mark.skipif(not decorators.compiled(), reason="one thread interprets")
+@pytest.mark.skipif(not decorators.jit_enabled(), reason="one thread interprets")
 def test_threads_change_no_bit(monkeypatch):
     points, side = mixed()
     candidates = above(200)
