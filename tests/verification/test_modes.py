@@ -380,7 +380,7 @@ def test_contact_stiffness_in_space_is_minus_the_second_difference_of_gaps(eleme
         return paired_points(candidates, pairing, rows, pair.primary, mesh.points + u, "facet", config.pose)
 
     points = [faced_at(factor * du) for factor in (-1.0, 0.0, 1.0)]
-    before, at_rest, after = (force @ np.einsum("nd,nd->n", p.apart, p.normal) for p in points)
+    before, at_rest, after = (force @ np.einsum("nd,nd->n", p.offset, p.normal) for p in points)
     second_difference = before - 2.0 * at_rest + after
     assert du.ravel() @ points[1].stiffness(force) @ du.ravel() == pytest.approx(-second_difference, rel=2e-4)
 
