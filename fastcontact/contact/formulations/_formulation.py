@@ -167,9 +167,8 @@ class Formulation(ABC):
     @cached_property
     def symmetry_planes(self) -> list[tuple[Array, Indices]]:
         """The planes of symmetry at the ends of the secondary surface, see `held_motions.symmetry_planes`."""
-        if self.held_motions is None:
-            return []
-        return symmetry_planes(self.held_motions, self.secondary, self.points, self.points[self.primary.points])
+        held, opposite = self.held_motions, self.points[self.primary.points]
+        return [] if held is None else symmetry_planes(held, self.secondary, self.points, opposite)
 
     @cached_property
     def node_candidates(self) -> Candidates:

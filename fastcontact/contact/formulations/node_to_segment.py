@@ -87,11 +87,10 @@ class NodeToSegment(Formulation):
         pairing.paired[self.excluded[self.secondary.points]] = False
         nodal_areas = self._nodal_forces.nodal_areas
         areas = np.where(nodal_areas > ROUND_OFF * nodal_areas.max(), nodal_areas, np.inf)
-        nodes = self.secondary.points.astype(np.intp)
         constraints = self.assembled(self.node_candidates, pairing, None, config)
         if self.opposite == "node":
             constraints = replace(constraints, geometry=None)
-        return replace(constraints, areas=areas, nodes=nodes, nodal=self._nodal_forces)
+        return replace(constraints, areas=areas, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal_forces)
 
     @cached_property
     def _nodal_forces(self) -> NodalForces:
