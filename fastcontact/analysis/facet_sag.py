@@ -111,21 +111,24 @@ def facet_length(side: Surface, points: Array) -> float:
 def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple[float, float]:
     """Return the range of the sag at closed facets [length], and the ratio d / L of the module's docstring [-]."""
     rules = [_rule(pair, block.element) for block in pair.secondary.blocks]
-    points = Candidates.inside(pair.secondary, [xi for xi, _ in rules])
+    points = Candidates.in_facets(pair.secondary, [xi for xi, _ in rules])
     deformed, closed = pair.points + configuration.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True
     extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), facet_length(pair.secondary, pair.points))
     if isinstance(pair.primary, RigidSide):
         rows = np.flatnonzero(closed[points.nodes].all(axis=1))
         nodes, pose = points.nodes[rows], configuration.pose
-        node_gaps = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
-        point_gaps = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
+        node_gaps = pair.primary.project(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
+        point_gaps = pair.primary.project(points.positions(deformed)[rows], pose)[0]
         # Gaps are infinite beyond the edge of a punch.
         facing = np.isfinite(node_gaps).all(axis=1) & np.isfinite(point_gaps)
         sag = np.einsum("nk,nk->n", points.shape[rows[facing]], node_gaps[facing]) - point_gaps[facing]
         spread = float(np.ptp(sag)) if len(sag) else 0.0
         return spread, spread / extent
-    smoothing, pairing = Smoothing.of(pair.secondary, pair.primary, pair.points), pair.facing(points, configuration)
+    smoothing, pairing = (
+        Smoothing.of(pair.secondary, pair.primary, pair.points),
+        pair.pair_candidates(points, configuration),
+    )
     rows = np.flatnonzero(pairing.paired)
     in_contact = closed[points.nodes[rows]].any(axis=1)
     if smoothing is None or points.facet is None or points.xi is None or not in_contact.any():

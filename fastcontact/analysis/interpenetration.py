@@ -142,10 +142,10 @@ def _through_obstacles(problem: Problem, displacement: Array, contact: Contacts)
         points = np.setdiff1d(np.concatenate(facets), nodes)
         if not len(points):
             continue
-        at_rest = pair.primary.facing(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]
+        at_rest = pair.primary.project(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]
         # Depths are those of the geometry, of which a clearance is not part.
         pose = pose_of(contact[name])
-        gap, contact_gap = (pair.primary.facing(mesh.points[at] + u[at], pose)[0] for at in (points, nodes))
+        gap, contact_gap = (pair.primary.project(mesh.points[at] + u[at], pose)[0] for at in (points, nodes))
         facing = np.isfinite(contact[name].gap)
         contact_depth = -float(np.min(contact_gap, initial=0.0, where=facing))
         limit = max(NOTABLE * float(np.ptp(u, axis=0).max()), DEPTH_RATIO * contact_depth)

@@ -192,8 +192,7 @@ def _traction_derivatives(law: CohesiveLaw, separation: Array, compression: floa
 
     size = DIFFERENCE_STEP * np.linalg.norm(separation, axis=0)
     steps = np.eye(len(separation))[:, :, None] * size
-    differences = [traction(separation + step) - traction(separation - step) for step in steps]
-    return np.stack([difference / (2.0 * size) for difference in differences], axis=1)
+    return np.stack([(traction(separation + h) - traction(separation - h)) / (2.0 * size) for h in steps], axis=1)
 
 
 def _axes_along(vectors: Array) -> tuple[Array, Indices]:

@@ -202,15 +202,12 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
 
 def _weights(force: Array, gap: Array) -> Array:
     """Return the weights (n_nodes,) of the nodes for the centre of pressure, whose sum is 1 [-]."""
-    weight, total = force, float(force.sum())
-    if total <= 1e-6 * float(np.abs(force).sum()):  # if tension nearly cancels or exceeds compression
+    weight = force
+    if float(force.sum()) <= 1e-6 * float(np.abs(force).sum()):  # if tension nearly cancels or exceeds compression
         weight = np.abs(force)
-        total = float(weight.sum())
-    if total > 0:
+    if (total := float(weight.sum())) > 0:
         return np.asarray(weight / total)
-    weight = np.zeros(len(force))
-    weight[int(np.argmin(gap))] = 1.0
-    return weight
+    return (np.arange(len(gap)) == np.argmin(gap)).astype(float)
 
 
 def _middle_in_2d(

@@ -41,7 +41,7 @@ def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict
     return "mortar", {**options, "multipliers": "dual"}, reason
 
 
-def against_obstacle(
+def default_against_obstacle(
     dim: int, facets: Collection[str], of_simplices: bool, options: Mapping[str, Any]
 ) -> tuple[str, dict[str, Any], str]:
     """Return the default formulation of a side against a rigid obstacle, its options, and the reason for the choice.

@@ -158,9 +158,9 @@ def facing_points(facets: OuterFacets, distance: float | None, angle: float) -> 
         return close
     # Two smooth faces that are close to each other in one place also face each other where their gap is larger.
     face = facets.smooth_face
-    key = np.sort(np.column_stack([face[close.facet], face[close.opposite]]), axis=1) @ [len(face), 1]
     distant = _search(facets, np.inf, angle, np.isin(face, face[np.concatenate([close.facet, close.opposite])]))
-    distant_key = np.sort(np.column_stack([face[distant.facet], face[distant.opposite]]), axis=1) @ [len(face), 1]
+    pairs = [np.sort(np.column_stack([face[p.facet], face[p.opposite]]), axis=1) for p in (close, distant)]
+    key, distant_key = (pair @ [len(face), 1] for pair in pairs)
     # The distant points include all open points of the same pairs of faces, and the close points those that touch or overlap.
     is_open, is_closed = np.isin(distant_key, key) & (distant.gap > 0.0), close.gap <= 0.0
     fields = ((close.facet, distant.facet), (close.opposite, distant.opposite), (close.gap, distant.gap))

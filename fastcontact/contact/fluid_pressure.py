@@ -53,11 +53,11 @@ class WettedRegion:
 
     def force(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length]."""
-        return np.asarray(-(self.nodal_weights @ self.areas.at(displacement)[0]))
+        return np.asarray(-(self.nodal_weights @ self.areas.with_derivative(displacement)[0]))
 
     def stiffness(self, displacement: Array) -> csr_array:
         """Return the symmetric part (n_dofs, n_dofs) of minus the derivative of `force` [force / length]."""
-        dim, derivative = displacement.shape[1], self.areas.at(displacement)[1]
+        dim, derivative = displacement.shape[1], self.areas.with_derivative(displacement)[1]
         K = csr_array(kron(self.nodal_weights, eye_array(dim)) @ derivative)
         return csr_array(0.5 * (K + K.T))
 
@@ -81,7 +81,7 @@ class AreaVectors:
     points: Array
     axisymmetric: bool
 
-    def at(self, displacement: Array) -> tuple[Array, csr_array]:
+    def with_derivative(self, displacement: Array) -> tuple[Array, csr_array]:
         """Return the vectors (n_nodes, dim) [-] at a `displacement` (n_points, dim) [length], and their derivative.
 
         The derivative is a matrix (n_nodes * dim, n_points * dim) [1 / length].
@@ -123,7 +123,7 @@ def with_fluid_pressure(
     side, points = areas.side, areas.points
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
     deformation = config.linearisation_point
-    vectors = areas.at(np.zeros_like(points) if deformation is None else deformation)[0]
+    vectors = areas.with_derivative(np.zeros_like(points) if deformation is None else deformation)[0]
     gaps = constraints.gaps(config.displacement)
     nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     if config.pressure is None:

@@ -26,7 +26,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
@@ -106,12 +106,12 @@ class InterpolatedNormals:
         at_nodes = smooth_normals(side, coordinates)[facet]
         return cls(NodalNormals(side, coordinates), feet.local, feet.shape, at_nodes)
 
-    def gradient(self, gradient: Array) -> Array:
+    def gradient(self, shape_gradient: Array) -> Array:
         """Return the derivatives (n, dim - 1, dim) of the normals with respect to the reference coordinates of facets [-].
 
-        `gradient` (n, k, dim - 1) contains the derivatives of the shape functions [-].
+        `shape_gradient` (n, k, dim - 1) contains the derivatives of the shape functions [-].
         """
-        slope = np.einsum("nki,nkd->nid", gradient, self._at_nodes) / self._length[:, None]
+        slope = np.einsum("nki,nkd->nid", shape_gradient, self._at_nodes) / self._length[:, None]
         return np.asarray(slope - np.einsum("nid,nd->ni", slope, self.normal)[:, :, None] * self.normal[:, None])
 
     def variation(self, du: Array) -> Array:
@@ -207,9 +207,9 @@ class _SurfacePoints:
             self.normal, self._normal_gradient = self.averaged.normal, self.averaged.gradient(feet.gradient)
         else:
             self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
-        # Let a_i be the tangent vectors, d the direction of the projection, g the distance along d, and dv the variation of
-        # the motion of the points relative to the facing points. Then ``a_i dxi_i + g dd = dv`` up to a multiple of d. The
-        # products with the tangents perpendicular to d eliminate this multiple.
+        # Let a_i be the tangent vectors, n the direction of the projection, g the distance along n, and dv the variation of
+        # the displacements of the points relative to the facing points. Then ``a_i dxi_i + g dn = dv`` up to a multiple of n.
+        # The products with the tangents perpendicular to n eliminate this multiple.
         direction, gradient = self.normal, self._normal_gradient
         if closest:
             direction, gradient = pairing.normal[rows], facet_gradient
@@ -303,11 +303,11 @@ class _ObstaclePoints:
     def __init__(self, secondary: csr_array, obstacle: RigidSide, coordinates: Array, pose: Pose) -> None:
         self.averaged = None
         self.motion, x = secondary, secondary @ coordinates
-        gap, self.normal, paired, _ = obstacle.facing(x, pose)
+        gap, self.normal, paired, _ = obstacle.project(x, pose)
         self._gap = np.where(paired, gap, 0.0)[:, None]
         self.offset = self._gap * self.normal
         step = DIFFERENCE_STEP * float(np.ptp(coordinates, axis=0).max())
-        pairs = [[obstacle.facing(x + sign * step * axis, pose)[1] for sign in (1, -1)] for axis in np.eye(x.shape[1])]
+        pairs = [[obstacle.project(x + sign * step * axis, pose)[1] for sign in (1, -1)] for axis in np.eye(x.shape[1])]
         self._gradient = np.stack([ahead - behind for ahead, behind in pairs], axis=2) / (2.0 * step)
         self._gradient[~np.isfinite(self._gradient)] = 0.0
 
@@ -330,7 +330,7 @@ Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 
 @dataclass(frozen=True, eq=False)
-class Closing:
+class ClosingMotion:
     """Part q m of the relative motion that closes the gap, with ``q = a . o / a . m``; see `Slips`.
 
     Attributes
@@ -359,7 +359,7 @@ class Closing:
     def of(
         cls, primary: Array, secondary: NodalNormals | InterpolatedNormals | None, opening: Array,
         length: Array | None = None,
-    ) -> Closing:  # fmt: skip
+    ) -> ClosingMotion:  # fmt: skip
         """Return the closing motion between sides with the normals `primary` (n, dim) and `secondary`.
 
         Without a given `length` (n,), the direction a is m.
@@ -460,7 +460,7 @@ class Slips:
         Slip vectors s [length].
     motion, start : ndarray (n_points, dim)
         Increments of displacements in the step and positions at its beginning, of all nodes [length].
-    closing : Closing, optional
+    closing : ClosingMotion, optional
         Part q m; None if neither the slip nor that of `substitutions` contains it.
     symmetric : bool
         Whether q m is part of the slip at all points.
@@ -476,7 +476,7 @@ class Slips:
     total: Array
     motion: Array
     start: Array
-    closing: Closing | None = None
+    closing: ClosingMotion | None = None
     symmetric: bool = True
     rotation_gradient: Array | None = None
     substitutions: Sequence[Substitution] = ()
@@ -598,12 +598,8 @@ class LinearisedPoints:
             (rows, count), d_paired_gaps = self.rows_in_pair, d_gaps
             d_gaps = np.zeros((len(d_gaps), count))
             d_gaps[:, rows] = d_paired_gaps
-        return self._to_nodes @ self._at_points(d_force, d_tangential) + d_points.motion.T @ self._force, d_gaps
-
-    @cached_property
-    def _to_nodes(self) -> csc_array:
-        """Map (n_points, n) from forces at the points to nodal forces [-]."""
-        return self.points.motion.T
+        nodal_forces = self.points.motion.T @ self._at_points(d_force, d_tangential) + d_points.motion.T @ self._force
+        return nodal_forces, d_gaps
 
     def _at_points(self, normal: Array, tangential: Array) -> Array:
         """Return the forces (n, dim) at the points for normal and tangential forces (m, dim) of the constraints [force]."""
@@ -665,7 +661,7 @@ class LinearisedPoints:
 
 
 @dataclass(frozen=True, eq=False)
-class Differences:
+class FiniteDifferences:
     """Contact forces, gaps and slips of one pair, linearised by one-sided finite differences.
 
     The differences are taken at the mean of the displacements of the pairing and of its solution. The error of a Newton step

@@ -69,7 +69,7 @@ class Candidates:
     xi: Array | None = None
 
     @classmethod
-    def inside(cls, side: Surface, xi: Sequence[Array]) -> Candidates:
+    def in_facets(cls, side: Surface, xi: Sequence[Array]) -> Candidates:
         """Return candidates at the same reference coordinates `xi` in all facets of a block.
 
         `xi` contains an array (n_q, dim - 1) for each block of `side` [-].
@@ -82,12 +82,12 @@ class Candidates:
         return cls(padded(nodes), padded(shapes), facet, np.concatenate(coordinates))
 
     @classmethod
-    def at(cls, nodes: Numbers) -> Candidates:
+    def from_nodes(cls, nodes: Numbers) -> Candidates:
         """Return the `nodes` (n,), given by their point numbers, as candidates."""
         return cls(nodes[:, None], np.ones((len(nodes), 1)))
 
     @classmethod
-    def nodes_of(cls, side: Surface) -> Candidates:
+    def from_side(cls, side: Surface) -> Candidates:
         """Return the nodes of a side as candidates; each is located on one of its facets."""
         facet, xi, first = np.zeros(len(side.points), np.intp), np.zeros((len(side.points), 1)), 0
         for block in side.blocks:
@@ -185,7 +185,7 @@ def pair(
     """
     if isinstance(primary, RigidSide):
         pose = Pose(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
-        _, normal, paired, offset = primary.facing(candidates, pose)
+        _, normal, paired, offset = primary.project(candidates, pose)
         no_facet = np.zeros(len(candidates), np.intp)
         return Pairing(no_facet, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     closest = closest_of_types(candidates, primary.node_positions(coordinates))

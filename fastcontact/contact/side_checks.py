@@ -57,7 +57,7 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
     """Raise ContactError if no facet of the secondary side of contact `name` faces the obstacle."""
     _check_normals(mesh, name, secondary)
     centres, outward, _ = _facet_geometry(mesh, secondary)
-    _, normal, paired, _ = obstacle.facing(centres, Pose(np.zeros(mesh.dim)))
+    _, normal, paired, _ = obstacle.project(centres, Pose(np.zeros(mesh.dim)))
     cosine = np.einsum("id,id->i", outward, normal)[paired]
     if len(cosine) and (cosine >= 0).all():
         raise ContactError(

@@ -53,20 +53,20 @@ class SmoothSide:
     heights: Array
     curvature: Array
 
-    def at(self, facet: Indices, xi: Array) -> Array:
+    def height(self, facet: Indices, xi: Array) -> Array:
         """Return the heights (n,) at the reference coordinates `xi` (n, dim - 1) of facets (n,) [length]."""
         k, m = self.heights.shape[1:]
         powers = np.vander(xi[:, 0], k, True), np.vander(xi[:, -1], m, True)
         return np.asarray(np.einsum("nij,ni,nj->n", self.heights[facet], *powers))
 
     def slope(self, facet: Indices, xi: Array) -> Array:
-        """Return the derivatives (n, dim - 1) of the heights `at` with respect to the reference coordinates [length]."""
+        """Return the derivatives (n, dim - 1) of the heights with respect to the reference coordinates [length]."""
         k, m = self.heights.shape[1:]
         derivatives = [
             replace(self, heights=np.arange(1.0, k)[:, None] * self.heights[:, 1:]),
             replace(self, heights=np.arange(1.0, m) * self.heights[:, :, 1:]),
         ]
-        return np.stack([side.at(facet, xi) for side in derivatives[: xi.shape[1]]], axis=1)
+        return np.stack([side.height(facet, xi) for side in derivatives[: xi.shape[1]]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class Smoothing:
         `height_factors`.
         """
         factor = self.height_factors(secondary[0], primary[0], frames)
-        return factor[:, 0] * self.secondary.at(*secondary) + factor[:, 1] * self.primary.at(*primary)
+        return factor[:, 0] * self.secondary.height(*secondary) + factor[:, 1] * self.primary.height(*primary)
 
 
 def frames(side: Surface, points: Array, coordinates: Array) -> Array:
@@ -231,7 +231,7 @@ class _Fit:
         R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
         return replace(self, polynomial=scale * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
 
-    def at(self, plane: Array) -> Array:
+    def height(self, plane: Array) -> Array:
         """Return the heights (n, m) above points (n, m, d) of the planes."""
         return _conic(self.curvature, plane) + np.einsum("nqt,nt->nq", _terms(plane, *self.powers), self.polynomial)
 
@@ -247,7 +247,7 @@ class _Fit:
     def error(self, points: Array, valid: Mask) -> Array:
         """Return the largest distances (n,) from the surfaces to those `points` (n, m, dim) that are `valid` (n, m)."""
         plane, height = self.in_planes(points)
-        return np.asarray(np.where(valid, np.abs(self.at(plane) - height), 0.0).max(axis=1))
+        return np.asarray(np.where(valid, np.abs(self.height(plane) - height), 0.0).max(axis=1))
 
     def slope_and_curvature(self) -> tuple[Array, Array]:
         """Return the slopes (n, d) and curvatures (n, d, d) at the centres of the facets."""
@@ -295,7 +295,7 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit, error: Array) -> tu
     element, k = elements.get(block.element), smooth.powers[0].max() + 1
     (xi, powers), (corners, _) = _lattice(element, k), smooth.in_planes(points[block.facets])
     shape = element.shape(xi)
-    height = smooth.at(np.einsum("qk,nke->nqe", shape, corners)) - smooth.at(corners) @ shape.T
+    height = smooth.height(np.einsum("qk,nke->nqe", shape, corners)) - smooth.height(corners) @ shape.T
     threshold = np.where(error > np.abs(height).max(axis=1), np.inf, LENGTH_ROUND_OFF)
     height = smooth.size[:, None] * np.where(np.abs(height) > threshold[:, None], height, 0.0)
     heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))

@@ -104,7 +104,7 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
             continue
         # Nodes without supports are included in the total, whether they face the other side or not.
         unsupported = len(contact_nodes) - len(nodes)
-        candidates = Candidates.at(nodes)
+        candidates = Candidates.from_nodes(nodes)
         undeformed = Configuration.undeformed(formulation.points)
         gap0, _, _ = _gaps(formulation, candidates, undeformed, with_clearance=False)
         overlaps = [_overlap_at(contact, formulation, candidates, gap0, supports, t) for t in supports.instants()]
@@ -154,7 +154,7 @@ def _gaps(
     formulation: Formulation, candidates: Candidates, configuration: Configuration, with_clearance: bool = True
 ) -> tuple[Array, csr_array, Mask]:
     """Return the gaps (m,) of nodes [length], their rows (m, n_dofs), and the mask (m,) of paired nodes."""
-    pairing = formulation.facing(candidates, configuration)
+    pairing = formulation.pair_candidates(candidates, configuration)
     rows, gap = gap_rows(candidates, pairing, formulation.primary, formulation.points)
     gap = gap + rows @ configuration.displacement.ravel()
     if with_clearance:
@@ -164,7 +164,7 @@ def _gaps(
 
 def _jumps(formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask) -> tuple[Array, Mask]:
     """Return the displacement jumps (m,) at tied nodes due to supports [length], and the mask (m,) of paired nodes."""
-    pairing = formulation.facing(candidates, Configuration.undeformed(formulation.points))
+    pairing = formulation.pair_candidates(candidates, Configuration.undeformed(formulation.points))
     square = np.zeros(len(pairing.paired))
     for axis in np.eye(fixed.shape[1]):
         direction = np.broadcast_to(axis, pairing.normal.shape)

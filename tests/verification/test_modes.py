@@ -369,14 +369,14 @@ def test_contact_stiffness_in_space_is_minus_the_second_difference_of_gaps(eleme
     model.add_contact("c", secondary=sides[0], primary=sides[1], formulation="continuous", normals="facet")
     pair = model.bind(model.contact[0], HeldMotions.of(model.prescribed_by_ramp()[0], csr_array((0, model.n_dofs))))
     config = Configuration.undeformed(mesh.points)
-    candidates = Candidates.inside(pair.secondary, [np.array([[0.2, 0.3]]) for _ in pair.secondary.blocks])
+    candidates = Candidates.in_facets(pair.secondary, [np.array([[0.2, 0.3]]) for _ in pair.secondary.blocks])
     near = np.linalg.norm(candidates.positions(mesh.points), axis=1) < 0.15  # products of gap and curvature are omitted
-    rows = np.flatnonzero(near & pair.facing(candidates, config).paired)
+    rows = np.flatnonzero(near & pair.pair_candidates(candidates, config).paired)
     rng = np.random.default_rng(0)
     du, force = 1e-4 * rng.normal(size=mesh.points.shape), 1.0 + rng.random(len(rows))
 
     def faced_at(u):
-        pairing = pair.facing(candidates, replace(config, displacement=u))
+        pairing = pair.pair_candidates(candidates, replace(config, displacement=u))
         return paired_points(candidates, pairing, rows, pair.primary, mesh.points + u, "facet", config.pose)
 
     points = [faced_at(factor * du) for factor in (-1.0, 0.0, 1.0)]

@@ -40,8 +40,8 @@ def _of_pair(pair: Formulation, step: StepResult, name: str, finite: bool) -> cs
         shape, areas = areas_of_rule(block, deformed if finite else pair.points, pair.axisymmetric)
         pressure.append((areas * (step.contact[name].pressure[block.local] @ shape.T)).ravel())
     force = np.concatenate(pressure)
-    candidates = Candidates.inside(pair.secondary, [fine_rule(block.element)[0] for block in pair.secondary.blocks])
-    pairing = pair.facing(candidates, configuration)
+    candidates = Candidates.in_facets(pair.secondary, [fine_rule(block.element)[0] for block in pair.secondary.blocks])
+    pairing = pair.pair_candidates(candidates, configuration)
     rows = np.flatnonzero(pairing.paired & (force != 0.0))
     normals = "facet" if pair.normals == "secondary" else pair.normals
     points = paired_points(candidates, pairing, rows, pair.primary, deformed, normals, configuration.pose)

@@ -25,7 +25,7 @@ from fastcontact.contact.held_motions import (
     symmetry_planes,
 )
 from fastcontact.contact.linearised_geometry import (
-    Closing,
+    ClosingMotion,
     InterpolatedNormals,
     LinearisedPoints,
     NodalNormals,
@@ -159,23 +159,21 @@ class Formulation(ABC):
     @cached_property
     def smoothing(self) -> Smoothing | None:
         """The smooth surfaces of both sides; None without smoothing, for flat sides, and with a constant normal."""
-        if not self.surface_smoothing or self.options.kind == "tied" or not isinstance(self.primary, Surface):
+        if not self.surface_smoothing or self.options.kind == "tied" or not isinstance(self.normals, str):
             return None
-        if not isinstance(self.normals, str):
-            return None
+        assert isinstance(self.primary, Surface)
         return Smoothing.of(self.secondary, self.primary, self.points)
 
     @cached_property
     def symmetry_planes(self) -> list[tuple[Array, Indices]]:
         """The planes of symmetry at the ends of the secondary surface, see `held_motions.symmetry_planes`."""
-        if self.held_motions is None:
-            return []
-        return symmetry_planes(self.held_motions, self.secondary, self.points, self.points[self.primary.points])
+        held, opposite = self.held_motions, self.points[self.primary.points]
+        return [] if held is None else symmetry_planes(held, self.secondary, self.points, opposite)
 
     @cached_property
     def node_candidates(self) -> Candidates:
         """The secondary nodes as candidates."""
-        return Candidates.nodes_of(self.secondary)
+        return Candidates.from_side(self.secondary)
 
     @property
     def eliminable(self) -> bool:
@@ -277,11 +275,9 @@ class Formulation(ABC):
     @cached_property
     def shortest_edge(self) -> float:
         """Length of the shortest facet, divided by the order of its shape functions [length]."""
-        sizes = [
-            np.linalg.norm(np.ptp(self.points[block.facets], axis=1), axis=1) / elements.get(block.element).order
-            for block in self.secondary.blocks
-        ]
-        return float(np.concatenate(sizes).min())
+        blocks = zip(self.secondary.blocks, self.secondary.node_positions(self.points), strict=True)
+        lengths = [np.linalg.norm(np.ptp(x, axis=1), axis=1) / elements.get(block.element).order for block, x in blocks]
+        return float(np.concatenate(lengths).min())
 
     @cached_property
     def tied(self) -> TiedPair | None:
@@ -314,11 +310,9 @@ class Formulation(ABC):
 
     def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
         """Return the secondary node (q,), numbered on its side, of each row of `moments`, see `tied.moments_of`."""
-        points = self.secondary.points
         if constraints.nodes is None:
-            return np.arange(len(points))
-        order = np.argsort(points)
-        return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])
+            return np.arange(len(self.secondary.points))
+        return self._number_on_side[constraints.nodes[: moments.shape[0]]]
 
     def never_opening(self, positions: Array, config: Configuration) -> Mask:
         """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]."""
@@ -327,7 +321,7 @@ class Formulation(ABC):
             return np.full(len(positions), always_closed)
         return np.asarray(_values_at(config.never_opening, positions))
 
-    def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
+    def pair_candidates(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates in the deformed configuration, with the options of the formulation.
 
         If `tolerance` is given, it replaces `projection_tolerance`.
@@ -403,7 +397,7 @@ class Formulation(ABC):
         rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
         if self.linearised_at_mean:
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
-            pairing = self.facing(candidates, config, np.inf)
+            pairing = self.pair_candidates(candidates, config, np.inf)
         coordinates = self.points + config.displacement
         slope = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, coordinates)
         options = self.primary, coordinates, self.normals, config.pose
@@ -424,7 +418,7 @@ class Formulation(ABC):
             averaged = InterpolatedNormals.of_facets(self.primary, coordinates, pairing.facet[rows], feet)
             slip_normals = averaged, averaged.gradient(feet.gradient)
         nodal, local = NodalNormals(self.secondary, coordinates), self._number_on_side[candidates.nodes[rows]]
-        closing = Closing.of(
+        closing = ClosingMotion.of(
             averaged.normal, InterpolatedNormals(nodal, local, candidates.shape[rows]), points.motion @ slips.start
         )
         slips = replace(slips, total=slips.total + closing.vector, closing=closing)
@@ -469,15 +463,14 @@ class Formulation(ABC):
             Minus the motion of a rigid primary side in the step; between two bodies, minus the tangential displacement that
             closes the gap, if `slip` is ``"symmetric"`` [length].
         """
-        rows, slip0 = list[csr_array](), np.zeros((len(directions), len(pairing.paired)))
-        for tangent in directions:
-            rows.append(rows_along(tangent, candidates, pairing, self.primary, self.points.size))
+        rows = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
+        slip0 = np.zeros((len(directions), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
             obstacle_motion = self.rigid_motion(candidates, config)
             slip0 = -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
         elif self.slip == "symmetric":
             slip0 = self._closing_slip(candidates, pairing, directions, config)
-        return tuple(rows), slip0
+        return rows, slip0
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
@@ -539,8 +532,8 @@ class Formulation(ABC):
         The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
         """
         assert self.held_motions is not None
-        candidates = Candidates.at(self.secondary.points[nodes])
-        pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
+        candidates = Candidates.from_nodes(self.secondary.points[nodes])
+        pairing = self.pair_candidates(candidates, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         held_primary = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
             rows = np.flatnonzero(pairing.paired)
@@ -568,8 +561,8 @@ class Formulation(ABC):
             return prescribed
         nodes = np.flatnonzero(np.isin(self.secondary.points, self.held_motions.restrained))
         if len(nodes):
-            candidates = Candidates.at(self.secondary.points[nodes])
-            pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
+            candidates = Candidates.from_nodes(self.secondary.points[nodes])
+            pairing = self.pair_candidates(candidates, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
             rows = rows_along(pairing.normal, candidates, pairing, self.primary, self.points.size)
             # The gap is prescribed if the free unknowns carry less than half of the length of its row.
             square, free_square = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ self.held_motions.motion))
@@ -622,7 +615,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         common, slip = self.held_motions.projectors_at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
-            slip = slip - self.rigid_motion(Candidates.at(points), config)
+            slip = slip - self.rigid_motion(Candidates.from_nodes(points), config)
         else:
             rows = np.flatnonzero(pairing.paired)
             feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
@@ -720,7 +713,7 @@ class Formulation(ABC):
             Unit normals of the primary side [-].
         """
         nodes = self.node_candidates
-        pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
+        pairing = self.pair_candidates(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if self.smoothing is not None:
             gap0 -= self.smoothing_overlap(nodes, pairing, config)
@@ -735,7 +728,7 @@ class Formulation(ABC):
         Nodes beyond the end of the primary side are included, because parts of their facets may carry pressure.
         """
         nodes = self.node_candidates
-        pairing = self.facing(nodes, config, np.inf)
+        pairing = self.pair_candidates(nodes, config, np.inf)
         directions = tangents(pairing.normal)
         rows, slip0 = self.slips(nodes, pairing, directions, config)
         slip, displacement = np.zeros_like(pairing.normal), (config.displacement - config.start).ravel()

@@ -98,7 +98,7 @@ def obstacle_overlap(
     for block in secondary.blocks:
         N, full_area = areas_of_rule(block, points[0], axisymmetric)
         positions = np.einsum("qk,fkd->fqd", N, points[1][block.facets])
-        gap, normal, paired, _ = obstacle.facing(positions.reshape(-1, positions.shape[2]), pose)
+        gap, normal, paired, _ = obstacle.project(positions.reshape(-1, positions.shape[2]), pose)
         foot = positions - (np.where(paired, gap, 0.0)[:, None] * normal).reshape(positions.shape)
         area = np.where(paired.reshape(full_area.shape), full_area, 0.0)
         mass.append(np.einsum("fq,qa,qb->fab", area, N, N))

@@ -34,8 +34,8 @@ from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NEGLIGIBLE_AREA, areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import (
-    Closing,
-    Differences,
+    ClosingMotion,
+    FiniteDifferences,
     LinearisedPoints,
     NodalNormals,
     Points,
@@ -277,7 +277,7 @@ class WeightedMortar(Formulation):
             sides = np.concatenate([self.secondary.points, self.primary.points])
             motions = displacement, displacement - config.start, displacement - config.displacement
             step = DIFFERENCE_STEP**1.5 * float(np.ptp(self.points[sides], axis=0).max())
-            return Differences(constraints, constraints_after, (multiplier, tangential), motions, sides, step)
+            return FiniteDifferences(constraints, constraints_after, (multiplier, tangential), motions, sides, step)
         config, deformed = replace(config, displacement=displacement), self.points + displacement
         coverages = [] if slip_data is None else [coverage for _, coverage in slip_data.substitutions]
         linearised, functions = self._linearised_points_of_overlap(config, means, multiplier, coverages)
@@ -289,7 +289,7 @@ class WeightedMortar(Formulation):
         if symmetric or coverages:
             opening = means.motion @ slips.start - means.gap_reduction
             secondary = None if is_rigid else NodalNormals(self.secondary, deformed)
-            closing = Closing.of(means.normal, secondary, opening, slip_data.length)
+            closing = ClosingMotion.of(means.normal, secondary, opening, slip_data.length)
             slips = replace(slips, total=slips.total + symmetric * closing.vector, closing=closing, symmetric=symmetric)
             for (substitution, _), weights in zip(slip_data.substitutions, functions, strict=True):
                 slips = slips.with_substitution(replace(substitution, functions=weights), linearised.points.motion)
@@ -498,7 +498,7 @@ class WeightedMortar(Formulation):
         model.
         """
         if isinstance(self.primary, RigidSide):
-            _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], pose)
+            _, normal, paired, _ = self.primary.project(deformed[self.secondary.points], pose)
             return np.where(paired[:, None], normal, -nodal_normals(self.secondary, deformed))
         if self.normals == "secondary":
             return -nodal_normals(self.secondary, deformed)

@@ -78,7 +78,7 @@ class Continuous(PressureFieldFormulation):
             rules.append(xi)
             size = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
             smallest_size = min(smallest_size, size.min() ** (1 / xi.shape[1]))
-        self._candidates = Candidates.inside(self.secondary, rules)
+        self._candidates = Candidates.in_facets(self.secondary, rules)
         rho = self.augmentation * self.modulus / smallest_size
         full_areas = np.concatenate(areas)
         usable_areas = np.where(self._candidates.belonging_to(self.excluded), 0.0, full_areas)
@@ -150,7 +150,7 @@ class Continuous(PressureFieldFormulation):
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the integration points on the deformed configuration, and return one constraint per point."""
-        pairing = self.facing(self._candidates, config)
+        pairing = self.pair_candidates(self._candidates, config)
         areas = self._field.projection.areas
         at_axis = self._at_axis
         pairing.paired[~(areas > ROUND_OFF * areas.max()) & ~at_axis] = False

@@ -192,8 +192,9 @@ class SegmentMortar(PressureFieldFormulation):
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
         """Return the class of the method for `dim` dimensions and the option `multipliers`."""
-        weighted = dim == 3 or str(options.get("multipliers", "standard")) != "standard"
-        return WeightedMortar if weighted else SegmentMortar
+        return (
+            WeightedMortar if dim == 3 or str(options.get("multipliers", "standard")) != "standard" else SegmentMortar
+        )
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
@@ -205,7 +206,7 @@ class SegmentMortar(PressureFieldFormulation):
         points = line_points(block, self.primary, self.points, deformed, *options)
         facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(block.facets[facet], shape, facet, points.xi[:, None])
-        pairing_of_points = self.facing(candidates, config)
+        pairing_of_points = self.pair_candidates(candidates, config)
         paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
@@ -216,10 +217,13 @@ class SegmentMortar(PressureFieldFormulation):
         usable_area, (n, k) = np.where(usable, area, 0.0), block.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        dependent = self.dependent_nodes(config)
+        nodes_and_shapes, areas, dependent = (
+            (block.local[facet], shape),
+            (usable_area, area),
+            self.dependent_nodes(config),
+        )
         values = self.with_common_values(independent_values(self.secondary, self._complete_facets, mass, dependent))
-        points_and_areas = (block.local[facet], shape), (usable_area, area)
-        field = PressureField.of_points(*points_and_areas, self._rho, values, has_new_points=True)
+        field = PressureField.of_points(nodes_and_shapes, areas, self._rho, values, has_new_points=True)
         return self.constraints_of_points(candidates, pairing, field, config)
 
 

@@ -66,13 +66,13 @@ class NodeToSegment(Formulation):
                     f"whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar'{advice}"
                 )
 
-    def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
+    def pair_candidates(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates with facets or, if `opposite` is ``"node"``, with the nearest primary nodes."""
-        pairing = super().facing(candidates, config, tolerance)
+        pairing = super().pair_candidates(candidates, config, tolerance)
         if self.opposite == "facet":
             return pairing
         assert isinstance(self.primary, Surface)
-        deformed, nodes = self.points + config.displacement, Candidates.nodes_of(self.primary)
+        deformed, nodes = self.points + config.displacement, Candidates.from_side(self.primary)
         closest = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
@@ -83,15 +83,14 @@ class NodeToSegment(Formulation):
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
-        pairing = self.facing(self.node_candidates, config)
+        pairing = self.pair_candidates(self.node_candidates, config)
         pairing.paired[self.excluded[self.secondary.points]] = False
         nodal_areas = self._nodal_forces.nodal_areas
         areas = np.where(nodal_areas > ROUND_OFF * nodal_areas.max(), nodal_areas, np.inf)
-        nodes = self.secondary.points.astype(np.intp)
         constraints = self.assembled(self.node_candidates, pairing, None, config)
         if self.opposite == "node":
             constraints = replace(constraints, geometry=None)
-        return replace(constraints, areas=areas, nodes=nodes, nodal=self._nodal_forces)
+        return replace(constraints, areas=areas, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal_forces)
 
     @cached_property
     def _nodal_forces(self) -> NodalForces:

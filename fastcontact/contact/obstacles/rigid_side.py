@@ -43,7 +43,7 @@ class RigidSide:
         """The nodes of the side, an empty array."""
         return np.empty(0, np.int32)
 
-    def facing(self, positions: Array, pose: Pose) -> tuple[Array, Array, Mask, Array]:
+    def project(self, positions: Array, pose: Pose) -> tuple[Array, Array, Mask, Array]:
         """Return gaps (n,), normals (n, dim), a mask (n,) of paired points and offsets (n,) at `positions` (n, dim) [length].
 
         To first order, the gap at a nearby position x is ``offset + normal . x``.

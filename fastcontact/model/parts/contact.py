@@ -15,7 +15,7 @@ import numpy as np
 
 from fastcontact._tools.argument_types import check_fields, typed
 from fastcontact.arrays import Mask
-from fastcontact.contact.default_formulation import against_obstacle, default_formulation
+from fastcontact.contact.default_formulation import default_against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles import Obstacle
@@ -329,7 +329,7 @@ class ModelContact(ModelConnections):
         given_options: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             kinds = self._facet_kinds(secondary)
-            formulation, given_options, reason = against_obstacle(self.mesh.dim, *kinds, given_options)
+            formulation, given_options, reason = default_against_obstacle(self.mesh.dim, *kinds, given_options)
             log.info("contact '%s': %s, since %s", name, method(formulation, given_options), reason)
         if formulation == "mortar":
             given_options.setdefault("multipliers", "dual")
@@ -409,7 +409,7 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
         available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in common)]
         available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:

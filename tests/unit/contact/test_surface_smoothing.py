@@ -35,9 +35,9 @@ def test_circles_are_met_from_both_sides_and_up_to_their_ends(element, tolerance
         xi = np.full((side.n_facets, 1), 0.4)
         place = elements.get(side.only_block.element).shape(xi[:1])[0] @ mesh.points[side.only_block.facets]
         exact = 50.0 - np.linalg.norm(place, axis=1)
-        assert smooth.at(np.arange(side.n_facets), xi) == pytest.approx(sign * exact, rel=tolerance)
+        assert smooth.height(np.arange(side.n_facets), xi) == pytest.approx(sign * exact, rel=tolerance)
         assert smooth.curvature.ravel() == pytest.approx(sign / 50.0, rel=2e-4)
-        assert smooth.at(np.arange(side.n_facets), np.ones_like(xi)) == pytest.approx(0.0, abs=1e-12)
+        assert smooth.height(np.arange(side.n_facets), np.ones_like(xi)) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("double", [False, True], ids=["cylinder", "sphere"])
@@ -55,7 +55,7 @@ def test_cylinders_and_spheres_are_met(element, divisions, tolerance, double):
     place = elements.get(side.only_block.element).shape(xi[:1])[0] @ mesh.points[side.only_block.facets]
     place += [0.2, 0.0, 0.0]
     exact = 2.0 - np.linalg.norm(place if double else place[:, [0, 2]], axis=1)
-    assert np.abs(smooth.at(facets, xi) - exact).max() < tolerance * np.abs(exact).max()
+    assert np.abs(smooth.height(facets, xi) - exact).max() < tolerance * np.abs(exact).max()
     principal = np.sort(np.linalg.eigvalsh(smooth.curvature), axis=1)
     assert principal == pytest.approx(np.tile([0.5 if double else 0.0, 0.5], (len(facets), 1)), abs=1e-3)
 
@@ -80,7 +80,7 @@ def test_flats_stay_flat_beside_fillets_and_up_to_corners():
     side = surface(mesh, "TOP")
     smooth = smooth_side(side, points)
     middle = points[side.only_block.facets].mean(axis=1)
-    height = smooth.at(np.arange(20), np.zeros((20, 1)))
+    height = smooth.height(np.arange(20), np.zeros((20, 1)))
     assert np.abs(height[middle[:, 0] < 1.0]).max() < 0.25 * 0.12**2 / 8
     assert height[middle[:, 0] > 1.2] == pytest.approx(1.2 * (1 - np.cos(0.05)), rel=1e-3)
 
