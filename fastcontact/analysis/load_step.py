@@ -35,7 +35,7 @@ from fastcontact.analysis.thermal_coupling import (
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, largest
-from fastcontact.contact.cohesive_layer import Layer
+from fastcontact.contact.cohesive_layer import CohesiveLayer
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Pressure
@@ -115,7 +115,7 @@ def _end_of_step(
         bodies = solution.terms.bodies.at(u)
         end = replace(end, history=bodies.history)
         # In the first step, which begins without a history, the path is unknown.
-        if problem.bodies.flows_freely and load.rise is None and start.history:
+        if problem.bodies.halving_estimates_error and load.rise is None and start.history:
             displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
             size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
             end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))
@@ -231,8 +231,8 @@ def _contact_at_end(
             slip = np.where((contact.active & ~rigid_stick)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         contact = replace(contact, slip=slip, slip_total=slipped[name])
-        if isinstance(constraints.tied, Layer):
-            bonds[name] = constraints.tied.after(constraints, end.u)
+        if isinstance(constraints.tied, CohesiveLayer):
+            bonds[name] = constraints.tied.bond_after(constraints, end.u)
             contact = replace(contact, damage=bonds[name].at(contact.coordinates)[1])
         elif pair.options.kind not in ("tied", "gap_only"):
             before = start.forces.get(name)

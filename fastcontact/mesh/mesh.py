@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
-from fastcontact.errors import MeshError, Suggesting, unknown
+from fastcontact.errors import MeshError, NameSuggestions, unknown
 from fastcontact.mesh import elements
 
 # Suffixes of the names of groups that belong to another group: the facets on the other side of a cut along the group, and
@@ -53,7 +53,7 @@ def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
 
 @typed(MeshError)
 @dataclass(frozen=True, eq=False)
-class Mesh(Suggesting):
+class Mesh(NameSuggestions):
     """Points, cells and named groups.
 
     A mesh contains solid cells, and facets (lines in 2D) that form groups on the boundary. Cells are numbered from 0,

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import closest_of_kinds
+from fastcontact.contact.projection import closest_of_types
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -92,7 +92,7 @@ def _depths(points: Array, facets: list[Array], selected: list[Mask] | None = No
     """
     selected = [np.ones(len(nodes), bool) for nodes in facets] if selected is None else selected
     targets = [nodes[mask] for nodes, mask in zip(facets, selected, strict=True)]
-    closest = closest_of_kinds(points, [nodes for nodes in targets if len(nodes)])
+    closest = closest_of_types(points, [nodes for nodes in targets if len(nodes)])
     size = max(float(np.abs(nodes).max()) for nodes in facets)
     height = np.einsum("nd,nd->n", points - closest.position, closest.normal)  # above the tangent planes
     inside = height < 0

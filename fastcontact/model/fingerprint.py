@@ -110,7 +110,7 @@ def _update(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array)
     if isinstance(value, Mesh):
         value = [value.points, value.cells, value.cell_groups, value.point_groups]
     if isinstance(value, Varying):
-        value = value.given
+        value = value.source
     if isinstance(value, csr_array):
         value = [value.data, value.indices.astype(np.int64), value.indptr.astype(np.int64)]
     if isinstance(value, np.ndarray):

@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact._jit.parallel import on_one_blas_thread
 from fastcontact._tools.neighbours import close_pairs
-from fastcontact._tools.units import in_si, inconsistency_message
+from fastcontact._tools.units import inconsistency_message, si_value
 from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.energy import gradients_at, integration_rule
 from fastcontact.elasticity.loads import LOAD_POINTS, BodyForce, Load, Pressure, Traction, Value, evaluated
@@ -107,7 +107,7 @@ def _units(model: Model) -> Iterator[str]:
     """Yield warnings if the named units are inconsistent, or if a modulus is implausible for a solid in these units."""
     units = model.units
     yield inconsistency_message(units)
-    pascal = in_si(units, "pressure")
+    pascal = si_value(units, "pressure")
     if pascal is None:
         return
     for material, groups in model.materials:

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.contact.projection import Closest, closest_of_kinds, places
+from fastcontact.contact.projection import Closest, closest_of_types, facet_points
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
@@ -171,7 +171,7 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
     sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in nodes_by_type])
     if (near.distance > LARGEST_DISTANCE * sizes[near.facet]).any() or (near.overhang > LARGEST_DISTANCE).any():
         return None
-    projected = places(side, near.facet, near.xi)
+    projected = facet_points(side, near.facet, near.xi)
     m, dim, n = len(nodes), mesh.dim, mesh.n_points
     weights, identity = shapes_at(projected.shape, projected.nodes, n), shapes_at(np.ones((m, 1)), nodes[:, None], n)
     return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))
@@ -191,12 +191,12 @@ def _closest(positions: Array, inward: Array, facets: Surface, nodes_by_type: li
     Where two bodies are in contact, a position lies on facets of both. It is assigned to the body into which `inward`
     (n, dim) points.
     """
-    near, shifted = (closest_of_kinds(positions + shift, nodes_by_type) for shift in (0.0, LARGEST_DISTANCE * inward))
-    nodes, shifted_nodes = (places(facets, closest.facet, closest.xi).nodes for closest in (near, shifted))
+    near, shifted = (closest_of_types(positions + shift, nodes_by_type) for shift in (0.0, LARGEST_DISTANCE * inward))
+    nodes, shifted_nodes = (facet_points(facets, closest.facet, closest.xi).nodes for closest in (near, shifted))
     first_facet = np.cumsum([0] + [len(block) for block in nodes_by_type])
     for row in np.flatnonzero((nodes[:, :, None] != shifted_nodes[:, None]).all(axis=(1, 2))):
         kind = int(np.searchsorted(first_facet, shifted.facet[row], side="right")) - 1
-        on_facet = closest_of_kinds(positions[[row]], [nodes_by_type[kind][[shifted.facet[row] - first_facet[kind]]]])
+        on_facet = closest_of_types(positions[[row]], [nodes_by_type[kind][[shifted.facet[row] - first_facet[kind]]]])
         for values, value in zip(near, on_facet, strict=True):
             values[row] = value[0]
         near.facet[row] = shifted.facet[row]

@@ -23,7 +23,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
-from fastcontact.elasticity.loads import Value, axes_of, check_number
+from fastcontact.elasticity.loads import Value, axis_values, check_number
 from fastcontact.errors import ContactError, ModelError, check_known
 from fastcontact.model.contact_pair import ContactPair, DrivingForce, FluidPressure, method, rotation_of
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
@@ -192,11 +192,11 @@ class ModelContact(ModelConnections):
         1
         """
         moduli = self.contact_moduli() if self.materials else None
-        from fastcontact.contact.found_contacts import FoundContacts, find_contacts, nothing_found
+        from fastcontact.contact.found_contacts import FoundContacts, find_contacts, no_contacts_message
 
         contacts = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
         if not contacts.pairs:
-            raise ContactError(nothing_found(self.mesh, distance, angle, groups))
+            raise ContactError(no_contacts_message(self.mesh, distance, angle, groups))
         self.mesh, added = contacts.mesh, []
         for pair in contacts:
             secondary, primary = pair.secondary, pair.primary
@@ -318,7 +318,7 @@ class ModelContact(ModelConnections):
         """
         from fastcontact.contact.obstacles.meshed import MeshedSurface
 
-        components = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
+        components = axis_values(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(components.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
         if not np.isfinite(displacement).all():
             raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
@@ -372,7 +372,7 @@ class ModelContact(ModelConnections):
         """
         if not force:
             return ()
-        forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
+        forces = axis_values(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
         for axis, value in forces.items():
             check_number(f"the force {'xyz'[axis]} on obstacle '{name}'", value)
             if axis in motion:
@@ -425,7 +425,7 @@ class ModelContact(ModelConnections):
         options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=has_obstacle)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
-            if not kind.against_obstacles:
+            if not kind.allows_obstacles:
                 raise ContactError(f"contact '{pair.name}': mortar in 2D needs multipliers='dual' at an obstacle")
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
             specific.setdefault("surface_smoothing", False)
@@ -436,9 +436,10 @@ class ModelContact(ModelConnections):
         axisymmetric = self.kinematics == "axisymmetric"
         interfaces = [interface for interface in self.periodic_interfaces if interface.turn is None or sectors_alike]
         points = secondary.points
-        turning = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
+        sector_rotation = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
         options = dataclasses.replace(
-            options, representatives=representatives(interfaces, self.mesh.n_points), turning=turning,
+            options, representatives=representatives(interfaces, self.mesh.n_points), sector_rotation=sector_rotation,
             source=self._fluid_source(pair, secondary, options),
         )  # fmt: skip
-        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)
+        sides = secondary, primary, self.mesh.points
+        return kind(*sides, axisymmetric, modulus, options=options, held_motions=held, **specific)

@@ -14,7 +14,7 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.elasticity.loads import Value, axes_of, check_points, check_value, evaluated
+from fastcontact.elasticity.loads import Value, axis_values, check_points, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.symmetry_axis import axis_nodes
@@ -152,7 +152,7 @@ class ModelSupports(ModelContact):
             frame = frames(checked_axes(axes), positions, self.kinematics)
         except ModelError as error:
             raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
-        for axis, value in axes_of(name, components, dim).items():
+        for axis, value in axis_values(name, components, dim).items():
             direction = frame[:, axis]
             if dim == 2 and np.abs(direction[:, 2]).max() > SINGLE_PRECISION:
                 raise ModelError(f"{name}: its axes have components out of the plane of the model")
@@ -183,7 +183,7 @@ class ModelSupports(ModelContact):
     ) -> None:  # fmt: skip
         """Add a support for each component of the displacement, after checking it."""
         check_points(self.mesh, group, "no displacement can be prescribed on it")
-        for axis, value in axes_of(f"the support of '{group}'", components, self.mesh.dim).items():
+        for axis, value in axis_values(f"the support of '{group}'", components, self.mesh.dim).items():
             name = displacement_name("xyz"[axis], group)
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
             value, table = _checked_value(name, value, table, rotation is not None)
