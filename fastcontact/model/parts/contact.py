@@ -409,7 +409,7 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
         available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in common)]
         available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:

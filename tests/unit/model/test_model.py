@@ -29,7 +29,7 @@ def test_dir_shows_what_a_user_calls():
 @pytest.mark.parametrize("add", [fc.Model.add_contact, fc.Model.add_contacts, fc.Model.add_obstacle])
 def test_options_of_contact_are_named_arguments(add):
     """For `help` and editors: those of all formulations and no others, None by default."""
-    given = {"secondary", "primary", "points", "axisymmetric", "modulus", "options", "held"}
+    given = {"secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions"}
     kinds = [
         kind.variant(dim, {"multipliers": m})
         for kind in FORMULATIONS.values()
