@@ -66,9 +66,9 @@ class _PartialSlip:
         """Return the radius or half-width [length] of the stick zone under an initial load."""
         return self.normal.radius * max(1.0 - load / self._limit, 0.0) ** self._POWER
 
-    def _at_current_force(self, of_initial_load: Callable[[float], Any]) -> Any:
-        """Return a quantity at the current force, given as a function of an initial load."""
-        return of_initial_load(self.tangential_force_peak) - 2.0 * of_initial_load(self._reversal)
+    def _at_current_force(self, quantity: Callable[[float], Any]) -> Any:
+        """Return a quantity at the current force, from the function `quantity` of an initial load."""
+        return quantity(self.tangential_force_peak) - 2.0 * quantity(self._reversal)
 
     def _traction(self, name: str, position: ArrayLike) -> Array:
         """Return the shear traction [pressure] at the current force; error messages call the position `name`.
@@ -78,11 +78,11 @@ class _PartialSlip:
         """
         x2, a = array(name, position) ** 2, self.normal.radius
 
-        def of_initial_load(load: float) -> Array:
+        def initial_traction(load: float) -> Array:
             roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(self._stick_radius(load) ** 2 - x2, 0.0))
             return self.friction * self.normal.pressure_max / a * roots
 
-        return np.asarray(self._at_current_force(of_initial_load))
+        return np.asarray(self._at_current_force(initial_traction))
 
 
 @dataclass(frozen=True)
@@ -120,12 +120,12 @@ class CattaneoMindlinLine(_PartialSlip):
         on the distant supports of the bodies; it is not included.
         """
 
-        def of_initial_load(load: float) -> float:
+        def initial_slip(load: float) -> float:
             remainder = max(1.0 - load / self._limit, 0.0)
             logarithm = remainder * math.log(remainder) if remainder > 0.0 else 0.0
             return self._limit / (math.pi * self.normal.E_star) * (logarithm + 1.0 - remainder)
 
-        return float(self._at_current_force(of_initial_load))
+        return float(self._at_current_force(initial_slip))
 
     def _slip(self, c: float, x: ArrayLike) -> Array:
         """Return the slip (...) [length] at `x` (...) [length] for a stick zone of half-width c."""
@@ -179,7 +179,7 @@ class CattaneoMindlinSphere(_PartialSlip):
         return self._traction("r", r)
 
 
-def _checked(normal: HertzLine | HertzPoint, friction: float, tangential_force: float) -> tuple[float, float]:
+def _checked_loads(normal: HertzLine | HertzPoint, friction: float, tangential_force: float) -> tuple[float, float]:
     """Return the checked coefficient of friction and tangential force.
 
     Warns if the bodies have different materials, which couple the normal and the tangential contact.
@@ -248,7 +248,7 @@ def cattaneo_mindlin_line(
     normal = hertz_line(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2, force=force, radius=radius, pressure_max=pressure_max
     )
-    f, T = _checked(normal, friction, tangential_force)
+    f, T = _checked_loads(normal, friction, tangential_force)
     return CattaneoMindlinLine(f, T, T, normal)
 
 
@@ -307,7 +307,7 @@ def cattaneo_mindlin_sphere(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2,
         force=force, approach=approach, radius=radius, pressure_max=pressure_max,
     )  # fmt: skip
-    f, T = _checked(normal, friction, tangential_force)
+    f, T = _checked_loads(normal, friction, tangential_force)
     return CattaneoMindlinSphere(f, T, T, normal)
 
 
@@ -366,10 +366,10 @@ def block_sliding(
     (True, 1.0, 0.008)
     """
     G = positive("E", E) / (2.0 * (1.0 + poisson("nu", nu)))
-    H, shift = positive("height", height), not_negative("displacement", displacement)
+    H, u = positive("height", height), not_negative("displacement", displacement)
     limit = not_negative("friction", friction) * not_negative("pressure", pressure)
-    elastic = G * shift / H
+    elastic = G * u / H
     sliding = elastic >= limit
     traction = limit if sliding else elastic
-    slip = shift - traction * H / G if sliding else 0.0
+    slip = u - traction * H / G if sliding else 0.0
     return BlockSliding(traction, slip, sliding, traction * slip)

@@ -72,7 +72,7 @@ def _table() -> Array:
     return np.array(data["rows"], dtype=np.float64) / np.array([R, E * R**2, E, R])
 
 
-def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
+def _interpolate(table: Array, x: float) -> tuple[float, float, float]:
     """Return force, pressure and radius at approach/R = x for E = R = 1.
 
     The interpolated quantities are smooth down to small loads. With s = sqrt(x), the ratios of force and pressure to
@@ -97,8 +97,8 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
 def _local_cubic(x: float, points: Array, values: Array) -> float:
     """Return the value at x of the cubic polynomial through the four points around x."""
     first = np.clip(np.searchsorted(points, x) - 2, 0, len(points) - 4)
-    around = slice(first, first + 4)
-    return float(np.polynomial.Polynomial.fit(points[around], values[around], 3)(x))
+    window = slice(first, first + 4)
+    return float(np.polynomial.Polynomial.fit(points[window], values[window], 3)(x))
 
 
 def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0, nu: float = NU) -> FiniteHalfSpheres:
@@ -146,5 +146,5 @@ def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0
         raise ModelError(
             f"approach is {x:g} R: the table of finite half spheres runs from {low:g} to {high:g}; {remedy}"
         )
-    force, pressure, radius = _interpolated(table, x)
+    force, pressure, radius = _interpolate(table, x)
     return FiniteHalfSpheres(E, R, delta, force * E * R**2, pressure * E, radius * R)

@@ -20,14 +20,14 @@ ComplexArray = NDArray[np.complex128]
 
 
 def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, ComplexArray, ComplexArray]:
-    """Return the depth, k, w and w - k (...) [-], each divided by b."""
-    across, depth = np.broadcast_arrays(array("x", x) / b, below_surface(y, b) / b)
-    k = depth + 1j * across
-    square = np.empty(k.shape, dtype=np.complex128)
-    square.real = (1.0 - across) * (1.0 + across) + depth**2
-    square.imag = 2.0 * across * depth
-    w = np.sqrt(square)
-    w = w.real + 1j * np.copysign(w.imag, across)  # on the surface outside the contact, Im w has the sign of x
+    """Return the depth, k, w and q = w - k (...) [-], each divided by b."""
+    lateral, depth = np.broadcast_arrays(array("x", x) / b, below_surface(y, b) / b)
+    k = depth + 1j * lateral
+    w_squared = np.empty(k.shape, dtype=np.complex128)
+    w_squared.real = (1.0 - lateral) * (1.0 + lateral) + depth**2
+    w_squared.imag = 2.0 * lateral * depth
+    w = np.sqrt(w_squared)
+    w = w.real + 1j * np.copysign(w.imag, lateral)  # on the surface outside the contact, Im w has the sign of x
     return depth, k, w, 1.0 / (w + k)  # (w - k)(w + k) = b^2; the difference w - k cancels far from the contact
 
 

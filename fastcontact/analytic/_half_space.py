@@ -32,14 +32,14 @@ def below_surface(z: ArrayLike, a: float) -> Array:
     return np.maximum(depth, 0.0)
 
 
-def _spheroidal(r: ArrayLike, z: ArrayLike, a: float) -> tuple[Array, Array]:
+def _spheroidal_coordinates(r: ArrayLike, z: ArrayLike, a: float) -> tuple[Array, Array]:
     """Return the spheroidal coordinates s and t (...) [-]: s - i t is the root of ((r^2 + z^2 - a^2) - 2 i a |z|)/a^2."""
     radial, depth = np.broadcast_arrays(np.abs(array("r", r)) / a, below_surface(z, a) / a)
-    square = np.empty(radial.shape, dtype=np.complex128)
+    root_squared = np.empty(radial.shape, dtype=np.complex128)
     # (r - a)(r + a), unlike r^2 - a^2, does not cancel at the edge of the contact.
-    square.real = (radial - 1.0) * (radial + 1.0) + depth**2
-    square.imag = 2.0 * depth
-    root = np.sqrt(square)
+    root_squared.real = (radial - 1.0) * (radial + 1.0) + depth**2
+    root_squared.imag = 2.0 * depth
+    root = np.sqrt(root_squared)
     return root.real, np.minimum(root.imag, 1.0)
 
 
@@ -59,7 +59,7 @@ def _legendre(s: Array) -> tuple[Array, Array, Array]:
 
 def stress(r: ArrayLike, z: ArrayLike, a: float, p0: float, nu: float) -> Array:
     """Return the stresses (..., 4) rr, zz, hoop, rz [pressure] at `r` (...) [length], `z` (...) [length] (Huber 1904)."""
-    s, t = _spheroidal(r, z, a)
+    s, t = _spheroidal_coordinates(r, z, a)
     _, q1, _ = _legendre(s)
     sum_of_squares = s**2 + t**2
     edge = sum_of_squares == 0.0
@@ -81,7 +81,7 @@ def displacement(r: ArrayLike, z: ArrayLike, a: float, p0: float, E: float, nu: 
     (Johnson 1985, eq. 3.2-3.6 without shear tractions).
     """
     radial, height = np.broadcast_arrays(array("r", r), -below_surface(z, a))
-    s, t = _spheroidal(r, z, a)
+    s, t = _spheroidal_coordinates(r, z, a)
     q0, q1, q2 = _legendre(s)
     V = p0 * a / 3.0 * (q0 + 0.5 * q2 * (3.0 * t**2 - 1.0))
     P = p0 * t * q1

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import Bodies, array, by_power_laws, effective_radius, exactly_one
+from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, quantities
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-_FLATTEST = 1e-6  # ratio of the axes b/a below which the contact is regarded as a line
+_SMALLEST_AXIS_RATIO = 1e-6  # ratio of the axes b/a below which the contact is regarded as a line
 
 
 @dataclass(frozen=True)
@@ -84,11 +84,11 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
     """Return the ratio b/a <= 1 of the semi-axes of the contact ellipse for a ratio R'/R'' >= 1 of the relative radii."""
     from scipy.optimize import brentq
 
-    if ratio_of_radii > _ratio_of_radii(_FLATTEST):
+    if ratio_of_radii > _ratio_of_radii(_SMALLEST_AXIS_RATIO):
         raise ModelError(
             f"the relative radii differ by a factor of {ratio_of_radii:g}: use hertz_line for line contact"
         )
-    logarithm, interval = math.log(ratio_of_radii), (math.log(_FLATTEST), 0.0)
+    logarithm, interval = math.log(ratio_of_radii), (math.log(_SMALLEST_AXIS_RATIO), 0.0)
     return math.exp(brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - logarithm, *interval, xtol=1e-15))
 
 
@@ -99,12 +99,12 @@ def _solve(bodies: Bodies, R_x: float, R_y: float, name: str, value: float) -> H
     E_star, R_mean = bodies.E_star, math.sqrt(R_x * R_y)
     k = _ratio_of_axes(max(R_x, R_y) / min(R_x, R_y))
     integrals = math.sqrt(elliprd(0.0, 1.0, k**2) * elliprd(0.0, k**2, 1.0)) / 3.0
-    # Quantities at a mean radius of 1, which grow with the powers in `laws`.
+    # Quantities at a mean radius sqrt(a b) of 1, which grow with the powers in `laws`; k is the ratio b/a.
     force = 1.0 / (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals)
     pressure = 1.5 * force / math.pi
     approach = pressure * math.sqrt(k) * float(ellipkm1(k**2)) / E_star
     laws = {"mean": (1.0, 1.0), "approach": (approach, 2.0), "force": (force, 3.0), "pressure_max": (pressure, 1.0)}
-    values = by_power_laws(laws, name, value)
+    values = quantities(laws, name, value)
     mean = values.pop("mean")
     axes = (mean / math.sqrt(k), mean * math.sqrt(k))
     return HertzElliptical(bodies, E_star, R_x, R_y, *(axes if R_x >= R_y else axes[::-1]), **values)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from fastcontact.analytic import _half_plane
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
-from fastcontact.analytic._inputs import Bodies, array, by_power_laws, effective_radius, exactly_one, in_plane, poisson
+from fastcontact.analytic._inputs import Bodies, array, check_plane, effective_radius, exactly_one, poisson, quantities
 from fastcontact.arrays import Array
 
 
@@ -124,7 +124,7 @@ def _solve(bodies: Bodies, kinematics: str, R: float, name: str, value: float) -
     """Return the contact in which the quantity called `name` has the given value."""
     E_star = bodies.E_star if kinematics == "plane_strain" else bodies.E_star_plane_stress
     laws = {"radius": (1.0, 1.0), "force": (0.25 * math.pi * E_star / R, 2.0), "pressure_max": (0.5 * E_star / R, 1.0)}
-    return HertzLine(bodies, kinematics, E_star, R, **by_power_laws(laws, name, value))
+    return HertzLine(bodies, kinematics, E_star, R, **quantities(laws, name, value))
 
 
 def hertz_line(
@@ -168,4 +168,4 @@ def hertz_line(
     (6.2146, 3585.36)
     """
     load = exactly_one(force=force, radius=radius, pressure_max=pressure_max)
-    return _solve(Bodies(E1, nu1, E2, nu2), in_plane(kinematics), effective_radius(R1, R2), *load)
+    return _solve(Bodies(E1, nu1, E2, nu2), check_plane(kinematics), effective_radius(R1, R2), *load)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from fastcontact.analytic import _half_space
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
-from fastcontact.analytic._inputs import Bodies, array, by_power_laws, effective_radius, exactly_one, poisson
+from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, poisson, quantities
 from fastcontact.arrays import Array
 
 
@@ -118,7 +118,7 @@ def _solve(bodies: Bodies, R: float, name: str, value: float) -> HertzPoint:
         "force": (4.0 / 3.0 * E_star / R, 3.0),
         "pressure_max": (2.0 * E_star / (math.pi * R), 1.0),
     }
-    return HertzPoint(bodies, E_star, R, **by_power_laws(laws, name, value))
+    return HertzPoint(bodies, E_star, R, **quantities(laws, name, value))
 
 
 def hertz_point(

@@ -157,20 +157,20 @@ def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")
     return positive(f"the relative curvature 1/{names[0]} + 1/{names[1]}", 1.0 / R1 + 1.0 / R2) ** -1
 
 
-def in_plane(kinematics: str) -> str:
+def check_plane(kinematics: str) -> str:
     """Return `kinematics` if it is "plane_strain" or "plane_stress"; otherwise raise ModelError."""
     check_known("kinematics", kinematics, PLANE, ModelError)
     return kinematics
 
 
-def by_power_laws(laws: Mapping[str, tuple[float, float]], name: str, value: float) -> dict[str, float]:
+def quantities(laws: Mapping[str, tuple[float, float]], name: str, value: float) -> dict[str, float]:
     """Return all quantities ``coefficient * radius**exponent`` of a contact from the `value` of the one called `name`.
 
     `laws` contains the coefficient and the exponent of each quantity by name.
 
     Examples
     --------
-    >>> by_power_laws({"radius": (1.0, 1.0), "area": (3.0, 2.0)}, "area", 12.0)
+    >>> quantities({"radius": (1.0, 1.0), "area": (3.0, 2.0)}, "area", 12.0)
     {'radius': 2.0, 'area': 12.0}
     """
     coefficient, exponent = laws[name]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import array, in_plane, not_negative, number, poisson, positive
+from fastcontact.analytic._inputs import array, check_plane, not_negative, number, poisson, positive
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -131,7 +131,7 @@ def thick_cylinder(
     >>> round(float(tube.hoop_stress(1.0)), 9)  # (b^2 + a^2) / (b^2 - a^2)
     1.666666667
     """
-    in_plane(kinematics)
+    check_plane(kinematics)
     return LameShell(inner_radius, outer_radius, inner_pressure, outer_pressure, E, nu, kinematics)
 
 
@@ -230,9 +230,9 @@ def press_fit_cylinders(
     >>> round(fit.pressure, 4)
     86.5385
     """
-    in_plane(kinematics)
+    check_plane(kinematics)
     radii = inner_radius, interface_radius, outer_radius
-    return _pair((E_inner, nu_inner), (E_outer, nu_outer), radii, interference, kinematics)
+    return _press_fit((E_inner, nu_inner), (E_outer, nu_outer), radii, interference, kinematics)
 
 
 def press_fit_spheres(
@@ -268,10 +268,10 @@ def press_fit_spheres(
     0.833333
     """
     radii = inner_radius, interface_radius, outer_radius
-    return _pair((E_inner, nu_inner), (E_outer, nu_outer), radii, interference, "sphere")
+    return _press_fit((E_inner, nu_inner), (E_outer, nu_outer), radii, interference, "sphere")
 
 
-def _pair(
+def _press_fit(
     inner: tuple[float, float], outer: tuple[float, float], radii: tuple[float, float, float], interference: float,
     kinematics: str,
 ) -> PressFit:  # fmt: skip

@@ -103,7 +103,7 @@ class HertzBox:
 
     def displacement(self, points: ArrayLike) -> Array:
         """Return the exact displacements (..., dim) [length] at `points` (..., dim) [length], zero at the origin."""
-        position, direction = self._in_plane(points)
+        position, direction = self._cylindrical(points)
         u = self.hertz.displacement(*position) - self.hertz.displacement(0.0, 0.0)
         u_r = np.where(position[0] == 0.0, 0.0, u[..., 0])  # exactly zero on the axis of symmetry
         return np.stack([*(u_r * cosine for cosine in direction), u[..., 1]], axis=-1)
@@ -113,7 +113,7 @@ class HertzBox:
 
         The order is xx, yy, zz, xy; in axisymmetry rr, yy, hoop, ry; in three dimensions xx, yy, zz, xy, yz, xz.
         """
-        position, direction = self._in_plane(points)
+        position, direction = self._cylindrical(points)
         stress = self.hertz.stress(*position)
         if self.dim == 2:
             return stress
@@ -123,7 +123,7 @@ class HertzBox:
         xy = (radial - hoop) * sine * cosine
         return np.stack([xx, yy, vertical, xy, shear * sine, shear * cosine], axis=-1)
 
-    def _in_plane(self, points: ArrayLike) -> tuple[tuple[Array, Array], tuple[Array, ...]]:
+    def _cylindrical(self, points: ArrayLike) -> tuple[tuple[Array, Array], tuple[Array, ...]]:
         """Return the distances from the axis and the heights [length], and the components of the radial direction [-]."""
         points = array("points", points)
         if points.ndim == 0 or points.shape[-1] != self.dim:

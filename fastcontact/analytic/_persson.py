@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import array, exactly_one, in_plane, not_negative, poisson, positive
+from fastcontact.analytic._inputs import array, check_plane, exactly_one, not_negative, poisson, positive
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -137,21 +137,21 @@ def persson_pin(
     from scipy.optimize import brentq
 
     modulus = positive("E", E)
-    if in_plane(kinematics) == "plane_strain":
+    if check_plane(kinematics) == "plane_strain":
         modulus /= 1.0 - poisson("nu", nu) ** 2
-    R, gap = positive("R", R), not_negative("clearance", clearance)
+    R, clearance = positive("R", R), not_negative("clearance", clearance)
     name, value = exactly_one(force=force, contact_angle=contact_angle)
     limit = persson_limit_angle()
     if name == "contact_angle":
-        if gap == 0.0:
+        if clearance == 0.0:
             raise ModelError("contact_angle cannot be given without clearance: any force gives the same angle")
         if value >= limit:
             raise ModelError(f"contact_angle is {value:g}: with clearance it must be below {limit:.4f} degrees")
-        return PerssonPin(R, gap, modulus * gap / _clearance_ratio(value), value)
-    if gap == 0.0:
-        return PerssonPin(R, gap, value, limit)
-    ratio = modulus * gap / value
+        return PerssonPin(R, clearance, modulus * clearance / _clearance_ratio(value), value)
+    if clearance == 0.0:
+        return PerssonPin(R, clearance, value, limit)
+    ratio = modulus * clearance / value
     # The angle of Hertzian line contact exceeds the root. Half of this angle, at most half of `limit`, is a lower bound.
     start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * ratio))))
     angle = brentq(lambda a: math.log(max(_clearance_ratio(a), 1e-300) / ratio), start, limit - 1e-12, xtol=1e-13)
-    return PerssonPin(R, gap, value, float(angle))
+    return PerssonPin(R, clearance, value, float(angle))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import array, by_power_laws, exactly_one, poisson, positive
+from fastcontact.analytic._inputs import array, exactly_one, poisson, positive, quantities
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -48,7 +48,7 @@ class FlatPunch:
         It is F/(2 pi a sqrt(a^2 - r^2)) under the punch, infinite at its edge and zero outside (Johnson 1985, eq. 3.34).
         Raises ModelError for a bonded punch, to which this formula does not apply.
         """
-        self._frictionless("pressure")
+        self._check_frictionless("pressure")
         inside = self.radius**2 - array("r", r) ** 2
         with np.errstate(divide="ignore"):
             value = self.force / (2.0 * math.pi * self.radius * np.sqrt(np.maximum(inside, 0.0)))
@@ -59,11 +59,11 @@ class FlatPunch:
 
         The formula is eq. 3.38 of Johnson (1985). Raises ModelError for a bonded punch, to which it does not apply.
         """
-        self._frictionless("normal displacement")
+        self._check_frictionless("normal displacement")
         ratio = self.radius / np.maximum(np.abs(array("r", r)), self.radius)
         return -2.0 * self.approach / math.pi * np.arcsin(ratio)
 
-    def _frictionless(self, quantity: str) -> None:
+    def _check_frictionless(self, quantity: str) -> None:
         """Raise ModelError if the punch is bonded."""
         if self.bonded:
             raise ModelError(f"a bonded flat punch has no closed form for its {quantity}: use bonded=False")
@@ -148,7 +148,7 @@ def _solve(E_star: float, A: float, n: float, name: str, value: float) -> PowerL
     coefficient = A * (math.sqrt(math.pi) * math.exp(math.lgamma(0.5 * n + 1.0) - math.lgamma(0.5 * n + 0.5)))
     force = 2.0 * E_star * coefficient * n / (n + 1.0), n + 1.0
     laws = {"radius": (1.0, 1.0), "approach": (coefficient, n), "force": force}
-    return PowerLawPunch(E_star, A, n, **by_power_laws(laws, name, value))
+    return PowerLawPunch(E_star, A, n, **quantities(laws, name, value))
 
 
 def _modulus(E: float, nu: float) -> float:
@@ -388,11 +388,11 @@ class FlatPunch2D:
         position = array("x", x) / self.half_width
         inside = np.abs(position) < 1.0
         t = np.where(inside, position, 0.0)
-        hardness = 3.0 - 4.0 * self.nu if self.bonded else 1.0
-        factor = 2.0 * (1.0 - self.nu) / math.sqrt(hardness) if self.bonded else 1.0
+        kappa = 3.0 - 4.0 * self.nu if self.bonded else 1.0  # Kolosov's constant; 1 makes the phase zero
+        factor = 2.0 * (1.0 - self.nu) / math.sqrt(kappa) if self.bonded else 1.0
         edge = np.where(np.abs(position) == 1.0, math.inf, 0.0)
         amplitude = factor * self.force / (math.pi * self.half_width * np.sqrt((1.0 - t) * (1.0 + t)))
-        return np.where(inside, amplitude, edge), math.log(hardness) / math.pi * np.arctanh(t)
+        return np.where(inside, amplitude, edge), math.log(kappa) / math.pi * np.arctanh(t)
 
 
 def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = False) -> FlatPunch2D:
@@ -452,7 +452,7 @@ def spence_stick_ratio(*, nu: float, friction: float) -> float:
         return 1.0
 
     # The unknown ln(k/k') with k' = sqrt(1 - k^2) resolves both ends of the interval (0, 1); a change of its sign exchanges
-    # the two integrals.
+    # the two integrals. SciPy's integrals are functions of m = k^2 or of m1 = k'^2.
     def residual(x: float) -> float:
         m = 1.0 / (1.0 + math.exp(-2.0 * x))
         m1 = 1.0 / (1.0 + math.exp(2.0 * x))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import Bodies, array, in_plane, not_negative, positive
+from fastcontact.analytic._inputs import Bodies, array, check_plane, not_negative, positive
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -166,7 +166,7 @@ def receding_layer(
     0.857
     """
     bodies = Bodies(E1, nu1, E2, nu2)
-    in_plane(kinematics)
+    check_plane(kinematics)
     h, P = positive("thickness", thickness), positive("force", force)
     a = not_negative("load_half_width", load_half_width) / h
     ratio = _modulus_ratio(bodies, kinematics)

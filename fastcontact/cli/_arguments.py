@@ -10,8 +10,8 @@ from typing import Any
 # kind of the argument and the help text. The kind is a type, a default value, or a dictionary of settings of argparse. A
 # nested table is a group of arguments, with its key as the title; the arguments of a group without a title are mutually
 # exclusive.
-def declare(parser: Any, table: Mapping[str, Any], **common: Any) -> None:
-    """Add the arguments of a table to a parser or to an argument group; `common` are settings of all arguments."""
+def declare(parser: Any, table: Mapping[str, Any], **settings: Any) -> None:
+    """Add the arguments of a table to a parser or to an argument group; `settings` are settings of all arguments."""
     for usage, entry in table.items():
         if isinstance(entry, Mapping):
             declare(parser.add_argument_group(usage) if usage else parser.add_mutually_exclusive_group(), entry)
@@ -22,7 +22,7 @@ def declare(parser: Any, table: Mapping[str, Any], **common: Any) -> None:
         flags = [word for word in usage.split() if word.startswith("-")]
         names = usage.split()[len(flags) :]
         form = {} if not flags else {"metavar": names[0]} if names else {"action": "store_true"}
-        parser.add_argument(*(flags or names), **{"help": text, **form, **kind, **common})
+        parser.add_argument(*(flags or names), **{"help": text, **form, **kind, **settings})
 
 
 def add_verbosity(parser: Any, default: Any) -> None:

@@ -22,13 +22,13 @@ from typing import Any
 
 DELAY = 0.05  # time after which a signal is sent again [s]
 # Time after a signal in which further signals are ignored as repetitions [s].
-REPETITION = 0.5
+REPETITION_TIME = 0.5
 HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):
     HANDLERS[signal.SIGHUP] = signal.SIG_DFL
 # Exit codes by signal, as in shells.
 EXIT_CODES: dict[int, int] = {number: 128 + number for number in HANDLERS}
-IMPORTING = ("importlib._bootstrap", "_frozen_importlib")
+IMPORT_MODULES = ("importlib._bootstrap", "_frozen_importlib")
 COMMAND_LINE = "fastcontact.cli._main"
 
 
@@ -45,7 +45,7 @@ def interruptible(received_signals: list[int] | None = None) -> Iterator[None]:
     numbers = [number for number, default in HANDLERS.items() if in_main_thread and signal.getsignal(number) == default]
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        if times and time.monotonic() - times[-1] < REPETITION:
+        if times and time.monotonic() - times[-1] < REPETITION_TIME:
             return
         if _is_importing(frame):
             _send_later(number)
@@ -130,7 +130,7 @@ def _send_later(number: int) -> None:
 def _is_importing(frame: FrameType | None) -> bool:
     """Return whether a frame belongs to the import of a module by the command."""
     while frame is not None and frame.f_globals.get("__name__") != COMMAND_LINE:
-        if frame.f_globals.get("__name__") in IMPORTING:
+        if frame.f_globals.get("__name__") in IMPORT_MODULES:
             return True
         frame = frame.f_back
     return False

@@ -31,7 +31,7 @@ SHELLS = ("bash", "zsh", "tcsh")
 # Options of the main command. With them, the mesh generators need not be declared.
 GLOBAL_OPTIONS = ("-h", "--help", "--version")
 # Names and metavars of the arguments whose values are file names.
-FILES = ("case", "file", "output", "mesh", "FILE", "PNG", "FOLDER", "DIR")
+FILE_ARGUMENTS = ("case", "file", "output", "mesh", "FILE", "PNG", "FOLDER", "DIR")
 
 
 class PrintCompletion(argparse.Action):
@@ -54,13 +54,13 @@ def _mark_files(parser: argparse.ArgumentParser, kind: Any) -> None:
         if isinstance(action, argparse._SubParsersAction):
             for subparser in action.choices.values():
                 _mark_files(subparser, kind)
-        elif {action.dest, action.metavar} & {*FILES}:
+        elif {action.dest, action.metavar} & {*FILE_ARGUMENTS}:
             action.complete = kind  # type: ignore[attr-defined]
 
 
 log = logging.getLogger("fastcontact")
 _FLAG = re.compile(r"(?<![\w-])--?[A-Za-z][\w-]*")
-_SEVERAL = re.compile(r"expected \d+ arguments")
+_WRONG_COUNT = re.compile(r"expected \d+ arguments")
 # Message of argparse for an invalid choice, with the valid names.
 _CHOICE = re.compile(r"argument (?P<kind>[\w-]+): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)")
 _NAME = re.compile(r"[\w-]+")
@@ -85,7 +85,7 @@ class Parser(argparse.ArgumentParser):
             message = unknown(choice["kind"].lower(), choice["given"], _NAME.findall(choice["known"]))
             if choice["kind"] == "COMMAND" and choice["given"].endswith((".toml", ".inp")):
                 message += f"; to solve a file, write '{self.prog} run {choice['given']}'"
-        message = _SEVERAL.sub(r"\g<0>, separated by blanks", message)
+        message = _WRONG_COUNT.sub(r"\g<0>, separated by blanks", message)
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
     def _print_message(self, message: str, file: Any = None) -> None:

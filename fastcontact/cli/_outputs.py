@@ -96,10 +96,10 @@ def save(axes: Any, path: str) -> None:
     from fastcontact._tools.paths import replacing
 
     try:
-        with warnings.catch_warnings(record=True) as caught, replacing(path) as target:
+        with warnings.catch_warnings(record=True) as caught_warnings, replacing(path) as target:
             warnings.simplefilter("always", UserWarning)
             axes.figure.savefig(target)
-        for text in dict.fromkeys(str(warning.message) for warning in caught):
+        for text in dict.fromkeys(str(warning.message) for warning in caught_warnings):
             say(f"warning: {path}: {' '.join(text.split())}", error=True)
     except ValueError as error:
         raise FileError(f"cannot write the picture '{path}': {error}") from error

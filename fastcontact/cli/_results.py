@@ -43,9 +43,9 @@ def select_contact(options: Namespace, step: Any) -> str:
     if options.contact is not None:
         check_known("contact pair", options.contact, step.contact, CaseError)
         return str(options.contact)
-    name, *others = step.contact
-    if others and not options.quiet:
-        quoted = ", ".join(f"'{other}'" for other in others)
+    name, *other_names = step.contact
+    if other_names and not options.quiet:
+        quoted = ", ".join(f"'{other_name}'" for other_name in other_names)
         text = f"contact '{name}', the first of {len(step.contact)}; others: {quoted} (choose with --contact NAME)"
         say(text, error=True)
     return str(name)

@@ -19,29 +19,29 @@ MPI_COMMAND = "mpiexec -n N python -m mpi4py.futures -m fastcontact ..."
 
 
 @contextlib.contextmanager
-def executor(where: str) -> Iterator[Any]:
+def executor(name: str) -> Iterator[Any]:
     """Yield the executor that ``--executor`` names, or None for local processes, and shut it down at the end.
 
     Raises CaseError if the name is unknown, the library is not installed, no process can be started, a process is lost, or no
     scheduler answers at the address.
     """
-    if where == "processes":
+    if name == "processes":
         yield None
         return
-    if where == "mpi":
+    if name == "mpi":
         with _mpi() as pool:
             yield pool
         return
-    if "://" not in where:
-        raise CaseError(f"--executor '{where}' must be processes, mpi, or the address of a Dask scheduler")
+    if "://" not in name:
+        raise CaseError(f"--executor '{name}' must be processes, mpi, or the address of a Dask scheduler")
     try:
         from dask.distributed import Client
     except ImportError as error:
-        raise CaseError(f"--executor {where} needs Dask ({error}): pip install distributed") from error
+        raise CaseError(f"--executor {name} needs Dask ({error}): pip install distributed") from error
     try:
-        client = Client(where)
+        client = Client(name)
     except (OSError, ValueError) as error:
-        raise CaseError(f"no Dask scheduler answers at --executor {where}: {error}") from error
+        raise CaseError(f"no Dask scheduler answers at --executor {name}: {error}") from error
     with client:
         yield client.get_executor()
 
@@ -126,8 +126,8 @@ def run_interruptibly(options: Namespace, study: Callable[..., Any]) -> Any:
 
     progress = StudyStatus(show=stderr_is_terminal() and not options.quiet)
     try:
-        with executor(options.executor) as where:
-            return study(executor=where, workers=options.workers, store=options.store, on_progress=progress)
+        with executor(options.executor) as pool:
+            return study(executor=pool, workers=options.workers, store=options.store, on_progress=progress)
     except KeyboardInterrupt:
         text = "stopped; with --store DIR the same command would continue where it stopped"
         if options.store:
@@ -157,6 +157,6 @@ def report(options: Namespace, result: Any, hint: str, failures: Sequence[str] =
         say(f"warning: {text}", error=True)
     if not options.quiet:
         say("\n".join(result.lines()))
-        written = [path for path in (options.json, options.csv, options.png, options.html, *paths) if path]
-        say(f"wrote {', '.join(written)}" if written else f"nothing written: {hint}")
+        file_names = [path for path in (options.json, options.csv, options.png, options.html, *paths) if path]
+        say(f"wrote {', '.join(file_names)}" if file_names else f"nothing written: {hint}")
     return 2 if failures else 0

@@ -80,9 +80,9 @@ def warnings_shown() -> Iterator[list[str]]:
         warnings.simplefilter("always", FastcontactWarning)
         original = warnings.showwarning
 
-        def show(message: Warning | str, category: type[Warning], *rest: object) -> None:
+        def show(message: Warning | str, category: type[Warning], *location: object) -> None:
             if not issubclass(category, FastcontactWarning):
-                original(message, category, *rest)  # type: ignore[arg-type]
+                original(message, category, *location)  # type: ignore[arg-type]
             elif str(message) not in texts:
                 texts.append(str(message))
                 log.warning("warning: %s", message)

@@ -28,8 +28,8 @@ def run(options: Namespace) -> int:
     if options.output and not options.copy:
         raise FastcontactError("-o needs --copy NAME, the case to copy")
     if options.copy:
-        written = copy_case(ready_made_case(options.copy), Path(options.output or f"{options.copy}.toml"))
-        say_written(options, *written)
+        new_paths = copy_case(ready_made_case(options.copy), Path(options.output or f"{options.copy}.toml"))
+        say_written(options, *new_paths)
     elif options.name:
         say(ready_made_case(options.name).read_text(encoding="utf-8").rstrip("\n"))
     elif not options.quiet:

@@ -37,7 +37,7 @@ def run(options: Namespace) -> int:
 
     _study.check_targets(options, options.output)
     if options.adaptive:
-        return _adaptive(options)
+        return _run_adaptive(options)
     elements, formulations, quantities = map(_study.split, (options.elements, options.formulations, options.quantities))
     study = _study.run_interruptibly(
         options,
@@ -47,7 +47,7 @@ def run(options: Namespace) -> int:
     return _study.report(options, study, HINT, failures)
 
 
-def _adaptive(options: Namespace) -> int:
+def _run_adaptive(options: Namespace) -> int:
     """Run an adaptive study, write the requested files and print the table; return 2 if the tolerance is not met."""
     from fastcontact.studies.adaptive import adaptive_study
 
@@ -56,8 +56,8 @@ def _adaptive(options: Namespace) -> int:
             options.case,
             options.adaptive,
             options.tolerance,
-            element=_only(options.elements, "element"),
-            formulation=_only(options.formulations, "formulation"),
+            element=_single_name(options.elements, "element"),
+            formulation=_single_name(options.formulations, "formulation"),
             max_dofs=options.max_dofs,
             progress=stderr_is_terminal() and not options.quiet,
         )
@@ -70,7 +70,7 @@ def _adaptive(options: Namespace) -> int:
     return 0 if study.reached else 2
 
 
-def _only(text: str | None, option: str) -> str | None:
+def _single_name(text: str | None, option: str) -> str | None:
     """Return the name in a text, or None if there is no text; CaseError for several names."""
     names = _study.split(text) or []
     if len(names) > 1:

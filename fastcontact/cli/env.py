@@ -27,9 +27,9 @@ def run(options: Namespace) -> int:
     files = cache.files.get(getattr(element_2d_kernels.add_stiffness, "py_func", None))
     say(f"{'cache':<12} {getattr(files, 'folder', 'none: kernels are compiled in every process')}")
     if options.warmup:
-        started = time.perf_counter()
-        done = _warm_up(show=stderr_is_terminal() and not options.quiet)
-        say(f"{'warm-up':<12} {done} kernels, {time.perf_counter() - started:.1f} s")
+        start_time = time.perf_counter()
+        n_kernels = _warm_up(show=stderr_is_terminal() and not options.quiet)
+        say(f"{'warm-up':<12} {n_kernels} kernels, {time.perf_counter() - start_time:.1f} s")
     return 0
 
 
@@ -38,7 +38,7 @@ def _warm_up(show: bool) -> int:
     from fastcontact._jit import ahead, decorators
     from fastcontact.analysis.progress import StatusLine
 
-    total, reading_end, writing_end, done = len(ahead.kernel_numbers(())), *os.pipe(), 0
+    total, reading_end, writing_end, n_started = len(ahead.kernel_numbers(())), *os.pipe(), 0
     with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
         processes = ahead.start((), decorators.threads(), writing_end, errors.fileno())
         os.close(writing_end)
@@ -46,15 +46,15 @@ def _warm_up(show: bool) -> int:
             open(reading_end, encoding="ascii") as lines,
             StatusLine(len("compiling kernels: 000 of 000"), show) as status,
         ):
-            for done, _ in enumerate(lines, start=1):
-                status.draw(f"compiling kernels: {done} of {total}")
-        failed = [code for code in (process.wait() for process in processes) if code]
+            for n_started, _ in enumerate(lines, start=1):
+                status.draw(f"compiling kernels: {n_started} of {total}")
+        codes = [code for code in (process.wait() for process in processes) if code]
         errors.seek(0)
         error_lines = errors.read().split("\n")
-    if failed:
-        manner = f"on {signal.Signals(-failed[0]).name}" if failed[0] < 0 else f"with exit code {failed[0]}"
+    if codes:
+        manner = f"on {signal.Signals(-codes[0]).name}" if codes[0] < 0 else f"with exit code {codes[0]}"
         reason = next(filter(None, reversed(error_lines)), "perhaps out of memory")
         raise FastcontactError(
-            f"a process that compiles kernels ended {manner} after starting {done} of {total} kernels: {reason}"
+            f"a process that compiles kernels ended {manner} after starting {n_started} of {total} kernels: {reason}"
         )
-    return done
+    return n_started

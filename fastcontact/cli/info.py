@@ -27,7 +27,7 @@ def run(options: Namespace) -> int:
     file = case_path(options.file)
     options.file, suffix = str(file), file.suffix.lower()
     if options.contacts or options.png:
-        return _contacts(options)
+        return _show_contacts(options)
     if suffix == ".vtkhdf":
         from fastcontact.results.reader import open_results
 
@@ -55,7 +55,7 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _contacts(options: Namespace) -> int:
+def _show_contacts(options: Namespace) -> int:
     """Print the contact pairs detected in a mesh, and draw them if requested."""
     from fastcontact.cases.case import files_of_case, read_case
     from fastcontact.contact.found_contacts import find_contacts

@@ -49,11 +49,11 @@ def run(options: Namespace) -> int:
     if options.csv or options.agr or options.png:
         say_written(options, options.csv, options.agr, options.png)
     else:
-        _print(table)
+        _print_table(table)
     return 0
 
 
-def _print(table: Any) -> None:
+def _print_table(table: Any) -> None:
     """Print the main columns of a table."""
     names = [name for name in table.dtype.names if name in ("point", "x", "y", "gap", "pressure", "active")]
     names += [name for name in table.dtype.names if name.startswith("pressure_")]
@@ -62,7 +62,7 @@ def _print(table: Any) -> None:
         say("  ".join(f"{row[name]:>14.6g}" for name in names))
 
 
-def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theory: dict[str, PressureCurve]) -> None:
+def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, PressureCurve]) -> None:
     """Write an XMGRACE project with the computed pressure and the theoretical pressures, given by label."""
     from fastcontact.results.units import axis_label
     from fastcontact.results.xmgrace import Curve, write_agr
@@ -71,7 +71,7 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theory:
     position = contact.place[order]
     style = "line+symbols" if contact.coordinates.shape[1] == 2 else "symbols"
     curves = [Curve(position, contact.pressure[order], "computed", style=style)]
-    for label, curve in theory.items():
+    for label, curve in theories.items():
         end = min(curve.radius, float(np.abs(position).max()))
         x = np.unique(np.concatenate([position[[0, -1]], np.linspace(max(-end, min(position[0], 0.0)), end, 200)]))
         curves.append(Curve(x, curve.pressure(np.abs(x)), label))

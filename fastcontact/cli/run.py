@@ -47,7 +47,7 @@ def run(options: Namespace) -> int:
     from fastcontact.cases import summary
     from fastcontact.cases.case import case_path, files_of_case, read_case
 
-    started = time.perf_counter()
+    start_time = time.perf_counter()
     if options.threads is not None:
         limit = os.cpu_count() or 1
         if not 1 <= options.threads <= limit:
@@ -59,34 +59,34 @@ def run(options: Namespace) -> int:
         case = read_case(options.case)
         read_end = time.perf_counter()
         with in_file(case_path(options.case)):  # checks the model before existing results are replaced
-            new = None if options.resume else _new_steps(options, case)
-            if new is None:
+            new_steps = None if options.resume else _new_steps(options, case)
+            if new_steps is None:
                 case.model.check(case.ramp)
             if case.deck is None and "study" in case.text:
                 from fastcontact.studies.checks import check_study
 
                 check_study(case)
-    with warnings_shown() as caught:
-        caught += setup_warnings
-        n_done, stored_warnings, last, steps = _write_steps(options, case, output, new)
-    texts = list(dict.fromkeys([*stored_warnings, *caught]))
-    computed = _modes(options, case, last)
-    timings = {"read": read_end - started, "solve": time.perf_counter() - read_end, "cpu": time.process_time()}
-    numbers = summary.summarise(case, last, steps, timings, texts, computed)
+    with warnings_shown() as run_warnings:
+        run_warnings += setup_warnings
+        n_done, stored_warnings, last, steps = _write_steps(options, case, output, new_steps)
+    texts = list(dict.fromkeys([*stored_warnings, *run_warnings]))
+    natural_modes = _modes(options, case, last)
+    timings = {"read": read_end - start_time, "solve": time.perf_counter() - read_end, "cpu": time.process_time()}
+    report = summary.summarise(case, last, steps, timings, texts, natural_modes)
     if options.json:
-        write_json(options.json, numbers)
+        write_json(options.json, report)
     if options.plot:
         profile_picture(case, last, options.plot)
     for text in texts:
-        if text not in caught:  # warnings of steps from an earlier run
+        if text not in run_warnings:  # warnings of steps from an earlier run
             say(f"warning: {text}", error=True)
     if not options.quiet:
-        say("\n".join(summary.lines(numbers)))
-        others = [path for path in (options.json, options.plot, options.modes) if path]
-        say(f"  {_files_message(output, n_done, len(steps), others)}")
-    failed = [check["name"] for check in numbers["checks"] if not check["passed"]]
+        say("\n".join(summary.lines(report)))
+        other_files = [path for path in (options.json, options.plot, options.modes) if path]
+        say(f"  {_files_message(output, n_done, len(steps), other_files)}")
+    failed = [check["name"] for check in report["checks"] if not check["passed"]]
     if options.strict and failed:
-        say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
+        say(f"{len(failed)} of {len(report['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
         return 3
     return 0
 
@@ -99,13 +99,13 @@ def _modes(options: Namespace, case: Case, last: StepResult) -> Any:
     from fastcontact.analysis.modes import modes
     from fastcontact.results.writer import ResultWriter
 
-    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **arguments})
+    result = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **arguments})
     if options.modes:
-        shapes, shape_model = (computed, case.model) if computed.twins is None else (computed.whole_ring(),) * 2
+        shapes, shape_model = (result, case.model) if result.twins is None else (result.whole_ring(),) * 2
         with ResultWriter(options.modes, shape_model, case_text=case.text) as writer:
             for mode in shapes:
                 writer.write(mode)
-    return computed
+    return result
 
 
 def _diameters(text: str | None) -> dict[str, Any]:
@@ -118,18 +118,18 @@ def _diameters(text: str | None) -> dict[str, Any]:
         raise CaseError(f"--nodal-diameters {text}: write integers separated by commas, or all") from None
 
 
-def _new_steps(options: Namespace, case: Case, done: Sequence[StepResult] = ()) -> Iterator[StepResult]:
-    """Check the model, and return an iterator that computes the steps after the steps `done`."""
+def _new_steps(options: Namespace, case: Case, earlier_steps: Sequence[StepResult] = ()) -> Iterator[StepResult]:
+    """Check the model, and return an iterator that computes the steps after the steps `earlier_steps`."""
     from fastcontact.analysis.run import solve_steps
 
     settings = {**case.solve_arguments, "linear_solver": options.linear or case.linear_solver}
-    return solve_steps(case.model, case.ramp, **settings, resume=done)
+    return solve_steps(case.model, case.ramp, **settings, resume=earlier_steps)
 
 
 def _write_steps(
-    options: Namespace, case: Case, output: Path, new: Iterator[StepResult] | None
+    options: Namespace, case: Case, output: Path, new_steps: Iterator[StepResult] | None
 ) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
-    """Compute and write all steps in `new`, or the remaining steps of a resumed run.
+    """Compute and write all steps in `new_steps`, or the remaining steps of a resumed run.
 
     Returns the number of earlier steps in a resumed file, their warnings, the last step, and the summaries of all steps.
     """
@@ -145,13 +145,13 @@ def _write_steps(
     with ResultWriter(output, case.model, case_text=case.text, **settings) as writer:
         _check_same_case(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
-        done = [(step_entry(step), step.warnings) for step in writer.done]  # reads each step only once
-        steps = [summary for summary, _ in done]
+        earlier = [(step_entry(step), step.warnings) for step in writer.done]  # reads each step only once
+        steps = [summary for summary, _ in earlier]
         _warn_of_steps_outside_ramp(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=stderr_is_terminal() and not options.quiet, done=len(steps))
         try:
-            for last in new or _new_steps(options, case, writer.done):
+            for last in new_steps or _new_steps(options, case, writer.done):
                 last = case.finished(last)
                 error = {ERROR_FIELD: estimate_error(case.model, last).cells} if fields else {}
                 writer.write(dataclasses.replace(last, cell_fields=error) if fields else last)
@@ -163,7 +163,7 @@ def _write_steps(
             raise
         finally:
             progress.close()
-    return len(done), list(dict.fromkeys(text for _, texts in done for text in texts)), last, steps
+    return len(earlier), list(dict.fromkeys(text for _, texts in earlier for text in texts)), last, steps
 
 
 def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:
@@ -179,32 +179,32 @@ def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary:
         write_json(summary, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps})
 
 
-def _check_same_case(case: Any, done: Sequence[Any], output: Path) -> None:
+def _check_same_case(case: Any, earlier_steps: Sequence[Any], output: Path) -> None:
     """Raise ModelError if the steps from which a run is resumed belong to another case."""
     from fastcontact.analysis import restart
 
-    if done:
+    if earlier_steps:
         try:
-            restart.check(done[-1], restart.identity(case.model, case.ramp, case.criteria), case.model)
+            restart.check(earlier_steps[-1], restart.identity(case.model, case.ramp, case.criteria), case.model)
         except ModelError as error:
             raise ModelError(f"'{output}' cannot be resumed: {error}") from error
 
 
-def _warn_of_steps_outside_ramp(case: Case, done: Sequence[float], output: Path) -> None:
+def _warn_of_steps_outside_ramp(case: Case, factors: Sequence[float], output: Path) -> None:
     """Warn if a step in the result file has a load factor that the ramp of the case does not contain."""
     instants = case.ramp.instants
-    others = [factor for factor in done if not any(math.isclose(factor, t, rel_tol=1e-9) for t in instants)]
-    if others:
+    extra = [factor for factor in factors if not any(math.isclose(factor, t, rel_tol=1e-9) for t in instants)]
+    if extra:
         warn(
-            f"'{output}' contains {len(done)} steps, but the case now has {len(instants)}: those in the file are kept, "
-            f"including that at load factor {others[0]:g}, which the case lacks; without --resume all steps are solved again"
+            f"'{output}' contains {len(factors)} steps, but the case now has {len(instants)}: those in the file are kept, "
+            f"including that at load factor {extra[0]:g}, which the case lacks; without --resume all steps are solved again"
         )
 
 
-def _files_message(output: Path, done: int, total: int, others: list[str]) -> str:
-    """Return a message on the files written, with the number of steps `done` before the run."""
-    if done == total:
+def _files_message(output: Path, n_done: int, total: int, other_files: list[str]) -> str:
+    """Return a message on the files written, with the number of steps `n_done` before the run."""
+    if n_done == total:
         message = f"{output} was complete with {total} steps, so that no step was solved"
-        return "; wrote ".join([message, ", ".join(others)] if others else [message])
-    resumed = f" (resumed after step {done})" if done else ""
-    return f"wrote {', '.join([f'{output}{resumed}', *others])}"
+        return "; wrote ".join([message, ", ".join(other_files)] if other_files else [message])
+    resumed = f" (resumed after step {n_done})" if n_done else ""
+    return f"wrote {', '.join([f'{output}{resumed}', *other_files])}"

@@ -33,7 +33,7 @@ def run(options: Namespace) -> int:
 
     _study.check_targets(options)
     parameters: dict[str, list[Any]] = {}
-    for name, parameter_values in map(values, options.set):
+    for name, parameter_values in map(parse_setting, options.set):
         if name in parameters:
             raise CaseError(f"--set {name} is given twice: give all its values at once, as in {name}=1,2,5")
         parameters[name] = parameter_values
@@ -42,7 +42,7 @@ def run(options: Namespace) -> int:
     return _study.report(options, sweep, "--png FILE writes a picture", [text for _, text in sweep.failed])
 
 
-def values(text: str) -> tuple[str, list[Any]]:
+def parse_setting(text: str) -> tuple[str, list[Any]]:
     """Return the parameter and the values of a string ``NAME=VALUES``; CaseError for other strings."""
     name, _, entries = text.partition("=")
     if not (name and entries):

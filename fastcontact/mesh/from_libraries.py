@@ -96,8 +96,8 @@ def from_pyvista(grid: Any) -> Mesh:
         raise MeshError(f"from_pyvista takes a pyvista.UnstructuredGrid, not {type(grid).__name__}")
     types = np.asarray(grid.celltypes)
     kinds = {int(kind): np.flatnonzero(types == kind) for kind in dict.fromkeys(types.tolist())}
-    known = {1: VERTEX} | {kind: element.meshio for kind, element in elements.BY_VTK.items()}
-    names = {kind: known[kind] for kind in kinds if kind in known}
+    meshio_names = {1: VERTEX} | {kind: element.meshio for kind, element in elements.BY_VTK.items()}
+    names = {kind: meshio_names[kind] for kind in kinds if kind in meshio_names}
     if len(names) < len(kinds):
         unknown = ", ".join(f"{len(kinds[kind])} of VTK's type {kind}" for kind in kinds if kind not in names)
         raise MeshError(

@@ -122,9 +122,9 @@ def quartered_triangle(rule: Rule) -> Rule:
 def _merge_points(points: Array, weights: Array) -> Rule:
     """Return a rule with coincident points merged."""
     unique, index = np.unique(np.round(points, 14), axis=0, return_inverse=True)
-    merged = np.zeros(len(unique))
-    np.add.at(merged, index.ravel(), weights)
-    return unique, merged
+    merged_weights = np.zeros(len(unique))
+    np.add.at(merged_weights, index.ravel(), weights)
+    return unique, merged_weights
 
 
 def gauss_cube(n: int) -> Rule:

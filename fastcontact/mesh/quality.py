@@ -16,7 +16,7 @@ from fastcontact.mesh.mesh import Mesh
 _ROUND_OFF = 1e-12
 # Limits beyond which a cell is poor: the smallest ratio of the smallest to the largest Jacobian, the largest angle [degrees],
 # and the smallest ratio of the volume to the cube of the longest edge.
-LEAST_JACOBIAN_RATIO, LARGEST_ANGLE, LEAST_VOLUME_RATIO = 0.05, 175.0, 1e-4
+MIN_JACOBIAN_RATIO, MAX_ANGLE, MIN_VOLUME_RATIO = 0.05, 175.0, 1e-4
 # Remedies for bad cells, as parts of messages.
 REMEDIES = {
     "degenerate": "remove it or merge its points differently",
@@ -117,11 +117,11 @@ def check_cells(mesh: Mesh) -> None:
         _check_nodes(mesh, name)
         _check_duplicates(mesh, name)
         measure, degenerate, inverted = _bad_cells(mesh, name)
-        for fault, bad in (("degenerate", degenerate), ("inverted", inverted)):
-            if bad.any():
-                row = int(np.flatnonzero(bad)[0])
+        for fault, is_bad in (("degenerate", degenerate), ("inverted", inverted)):
+            if is_bad.any():
+                row = int(np.flatnonzero(is_bad)[0])
                 cell = _cell_text(mesh, name, row, measure[row])
-                raise MeshError(f"{cell} is {fault} (number of such cells: {int(bad.sum())}): {REMEDIES[fault]}")
+                raise MeshError(f"{cell} is {fault} (number of such cells: {int(is_bad.sum())}): {REMEDIES[fault]}")
 
 
 def poorest_cell(mesh: Mesh) -> str:
@@ -135,14 +135,14 @@ def poorest_cell(mesh: Mesh) -> str:
         # For each criterion: the excess over its limit, the value, and the text of the message.
         ratio, volume = min_det / max_det, measure / longest**3
         text = "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh"
-        criteria = [(LEAST_JACOBIAN_RATIO - ratio, ratio, text)]
+        criteria = [(MIN_JACOBIAN_RATIO - ratio, ratio, text)]
         if mesh.dim == 2:
             angle = np.degrees(corner_angles(_corners(mesh, name)).max(axis=1))
             text = "it has an angle of {:.1f} degrees; move its nodes or remesh"
-            criteria.append((angle - LARGEST_ANGLE, angle, text))
+            criteria.append((angle - MAX_ANGLE, angle, text))
         else:
             text = "its volume is only {:.1e} of its longest edge cubed; remesh there"
-            criteria.append((LEAST_VOLUME_RATIO - volume, volume, text))
+            criteria.append((MIN_VOLUME_RATIO - volume, volume, text))
         for excess, value, text in criteria:
             row = int(np.argmax(excess))
             if excess[row] > 0.0:

@@ -160,10 +160,10 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
     outer, cell_numbers, pairs = {}, {}, [np.empty((2, 0), np.int32)]
     for name, blocks in by_kind.items():
         facets, owner = map(np.concatenate, zip(*blocks, strict=True))
-        equal = np.stack(equal_rows(np.sort(facets, axis=1)))
+        pair_rows = np.stack(equal_rows(np.sort(facets, axis=1)))
         single = np.ones(len(facets), bool)
-        single[equal] = False
-        pairs.append(owner[equal])
+        single[pair_rows] = False
+        pairs.append(owner[pair_rows])
         if single.any():
             outer[name], cell_numbers[name] = facets[single], owner[single]
             outer[name].setflags(write=False)
@@ -179,8 +179,8 @@ def equal_rows(rows: Indices | Numbers) -> tuple[Indices, Indices]:
     columns = np.ascontiguousarray(rows.T)  # long columns are compared faster than short rows
     order = np.lexsort(columns)
     columns = columns[:, order]
-    same = (columns[:, 1:] == columns[:, :-1]).all(axis=0)
-    return order[:-1][same], order[1:][same]
+    is_same = (columns[:, 1:] == columns[:, :-1]).all(axis=0)
+    return order[:-1][is_same], order[1:][is_same]
 
 
 def same_facets(table: Numbers, facets: Numbers) -> Indices:
@@ -369,8 +369,8 @@ def _common_nodes(node: Indices, part: Indices) -> tuple[Indices, Indices, Indic
     """
     pairs = [np.empty((3, 0), np.intp)]
     shift = 1
-    while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
-        pairs.append(np.stack([part[same], part[same + shift], node[same]]))
+    while len(rows := np.flatnonzero(node[shift:] == node[:-shift])):
+        pairs.append(np.stack([part[rows], part[rows + shift], node[rows]]))
         shift += 1
     first, second, common = np.concatenate(pairs, axis=1)
     return first, second, common

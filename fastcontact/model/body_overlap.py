@@ -53,18 +53,18 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
         np.maximum.at(nodal_tolerance, facets, _curvature_tolerance(name, coordinates[facets])[:, None])
     for first, second in permutations(range(count), 2):
         low, high = coordinates[nodes[second]].min(axis=0), coordinates[nodes[second]].max(axis=0)
-        near = nodes[first]
-        near = near[((coordinates[near] >= low) & (coordinates[near] <= high)).all(axis=1)]
-        if not len(near):
+        candidates = nodes[first]
+        candidates = candidates[((coordinates[candidates] >= low) & (coordinates[candidates] <= high)).all(axis=1)]
+        if not len(candidates):
             continue
         blocks = {name: coordinates[facets] for name, facets in sides[second].items() if len(facets)}
         off_axis = None
         if kinematics == "axisymmetric":
             size = max(float(np.abs(block).max()) for block in blocks.values())
             off_axis = [(np.abs(block[:, :, 0]) > LENGTH_ROUND_OFF * size).any(axis=1) for block in blocks.values()]
-        depth, facet = _depths(coordinates[near], list(blocks.values()), off_axis)
+        depth, facet = _depths(coordinates[candidates], list(blocks.values()), off_axis)
         tolerance = np.concatenate([_curvature_tolerance(name, block) for name, block in blocks.items()])[facet]
-        yield first, second, near, np.where(depth <= tolerance + nodal_tolerance[near], 0.0, depth)
+        yield first, second, candidates, np.where(depth <= tolerance + nodal_tolerance[candidates], 0.0, depth)
 
 
 def _curvature_tolerance(name: str, nodes: Array) -> Array:

@@ -149,8 +149,8 @@ def _share_cells(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) 
     connected = np.zeros(len(node), bool)
     for k, (number, ends) in enumerate(zip(node.tolist(), corners.tolist(), strict=True)):
         kind = outer.elements[outer.kind[facet[k]]]
-        behind = [c for c, name in cells[ends[0]] if c.issuperset(ends) and kind in elements.get(name).facet_elements]
-        shared = [cell & other for cell in behind for other, _ in cells[number]]
+        hosts = [c for c, name in cells[ends[0]] if c.issuperset(ends) and kind in elements.get(name).facet_elements]
+        shared = [cell & neighbour for cell in hosts for neighbour, _ in cells[number]]
         connected[k] = any(len(common) >= mesh.dim and not common.issubset(ends) for common in shared)
     return connected
 

@@ -158,7 +158,7 @@ def _peak(ramp: Table | None) -> float:
 def _close_nodes(model: Model) -> str:
     """Return a warning if nodes of solid cells nearly coincide without a contact or constraint between them."""
     mesh, size = model.mesh, float(np.ptp(model.mesh.points, axis=0).max())
-    # Length of the shortest edge at each node on the surface of a body, and infinity at other nodes, which are not on cracks.
+    # Length of the shortest edge at each node on the surface of a body; infinity at inner nodes, which lie on no crack.
     edge = np.full(mesh.n_points, np.inf)
     for name, facets in outer_facets(mesh).items():
         corners = mesh.points[facets[:, : elements.get(name).n_corners]]

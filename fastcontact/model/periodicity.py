@@ -191,15 +191,15 @@ def _closest(positions: Array, inward: Array, facets: Surface, nodes_by_type: li
     Where two bodies are in contact, a position lies on facets of both. It is assigned to the body into which `inward`
     (n, dim) points.
     """
-    near, inside = (closest_of_types(positions + shift, nodes_by_type) for shift in (0.0, LARGEST_DISTANCE * inward))
-    nodes, nodes_inside = (facet_points(facets, closest.facet, closest.xi).nodes for closest in (near, inside))
+    near, shifted = (closest_of_types(positions + shift, nodes_by_type) for shift in (0.0, LARGEST_DISTANCE * inward))
+    nodes, shifted_nodes = (facet_points(facets, closest.facet, closest.xi).nodes for closest in (near, shifted))
     first_facet = np.cumsum([0] + [len(block) for block in nodes_by_type])
-    for row in np.flatnonzero((nodes[:, :, None] != nodes_inside[:, None]).all(axis=(1, 2))):
-        kind = int(np.searchsorted(first_facet, inside.facet[row], side="right")) - 1
-        on_facet = closest_of_types(positions[[row]], [nodes_by_type[kind][[inside.facet[row] - first_facet[kind]]]])
+    for row in np.flatnonzero((nodes[:, :, None] != shifted_nodes[:, None]).all(axis=(1, 2))):
+        kind = int(np.searchsorted(first_facet, shifted.facet[row], side="right")) - 1
+        on_facet = closest_of_types(positions[[row]], [nodes_by_type[kind][[shifted.facet[row] - first_facet[kind]]]])
         for values, value in zip(near, on_facet, strict=True):
             values[row] = value[0]
-        near.facet[row] = inside.facet[row]
+        near.facet[row] = shifted.facet[row]
     return near
 
 

@@ -28,7 +28,7 @@ ZERO_COEFFICIENT = 1e-6
 # Depths below this fraction of the largest prescribed displacement are admissible [-].
 ADMISSIBLE_DEPTH = 1e-3
 # Largest number of instants of a ramp that are checked.
-MOST_INSTANTS = 20
+MAX_INSTANTS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +40,9 @@ class Supports:
     ramp: Ramp
 
     def instants(self) -> list[float]:
-        """Return at most MOST_INSTANTS evenly distributed instants of the ramp, including the first and the last."""
+        """Return at most MAX_INSTANTS evenly distributed instants of the ramp, including the first and the last."""
         instants = self.ramp.instants
-        return [instants[k] for k in np.unique(np.linspace(0, len(instants) - 1, MOST_INSTANTS).round().astype(int))]
+        return [instants[k] for k in np.unique(np.linspace(0, len(instants) - 1, MAX_INSTANTS).round().astype(int))]
 
     def at(self, instant: float) -> Array:
         """Return the displacements (n_points, dim), zero where nothing is prescribed [length]."""

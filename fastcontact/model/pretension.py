@@ -144,6 +144,7 @@ def pretension(
     amounts : (float or None, float or None, float or None)
         Force [force], shortening [length], and load factor from which the shortening is locked [-].
     ramp : tuple, optional
+        Ramp of the force or shortening.
 
     Raises
     ------

@@ -48,7 +48,7 @@ class Harmonic:
 # History of a part of the prescribed displacements; None means the history of the analysis.
 PartHistory = Table | Harmonic | None
 # Largest number of equal steps. A larger number is probably a typing error.
-MOST_STEPS = 1_000_000
+MAX_STEPS = 1_000_000
 
 
 def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") -> Table:
@@ -182,8 +182,8 @@ def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     """
     if int(steps) != steps or steps < 1:
         raise ModelError(f"the number of load steps must be a positive whole number, not {steps}")
-    if steps > MOST_STEPS:
-        raise ModelError(f"{steps} load steps are more than {MOST_STEPS}, the largest possible number: use fewer steps")
+    if steps > MAX_STEPS:
+        raise ModelError(f"{steps} load steps are more than {MAX_STEPS}, the largest possible number: use fewer steps")
     if not end > 0:
         raise ModelError(f"the ramp must end at a positive load factor, not {end}")
     return Ramp(tuple(end * (i + 1) / int(steps) for i in range(int(steps))), ((0.0, 0.0), (end, 1.0)))

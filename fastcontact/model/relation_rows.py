@@ -144,10 +144,10 @@ def vectors_to_facets(mesh: Mesh, nodes: Indices) -> Array:
 
     Only facets whose nodes are all among `nodes` are considered. The vectors are zero for nodes without such a facet.
     """
-    inside, total, count = np.zeros(mesh.n_points, bool), np.zeros_like(mesh.points), np.zeros(mesh.n_points)
-    inside[nodes] = True
+    is_given, total, count = np.zeros(mesh.n_points, bool), np.zeros_like(mesh.points), np.zeros(mesh.n_points)
+    is_given[nodes] = True
     for facets in outer_facets(mesh).values():
-        facets_of_nodes = facets[inside[facets].all(axis=1)]
+        facets_of_nodes = facets[is_given[facets].all(axis=1)]
         np.add.at(total, facets_of_nodes, mesh.points[facets_of_nodes].mean(axis=1)[:, None])
         np.add.at(count, facets_of_nodes, 1.0)
     total, count = total[nodes], count[nodes, None]

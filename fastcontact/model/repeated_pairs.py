@@ -31,12 +31,12 @@ def check_repeated_facets(mesh: Mesh, first: ContactPair, second: ContactPair) -
             f"'{second.name}': remove one of the two"
         )
     else:
-        for facing, opposite in ((second.secondary, second.primary), (second.primary, second.secondary)):
-            nodes = nodes_of_shared_facets(mesh, first.secondary, facing)
+        for partner, opposite in ((second.secondary, second.primary), (second.primary, second.secondary)):
+            nodes = nodes_of_shared_facets(mesh, first.secondary, partner)
             if len(nodes) and len(nodes_of_shared_facets(mesh, first.primary, opposite)):
                 raise ContactError(
                     f"contact '{first.name}' pairs facets of '{first.secondary}' and '{first.primary}' that are also paired "
-                    f"by contact '{second.name}': '{first.secondary}' and '{facing}' share facets with {len(nodes)} nodes "
+                    f"by contact '{second.name}': '{first.secondary}' and '{partner}' share facets with {len(nodes)} nodes "
                     f"(first: point {nodes[0]}), and '{first.primary}' and '{opposite}' share facets, too. Remove one of the "
                     "two contacts, or separate their groups"
                 )

@@ -39,7 +39,7 @@ NEARLY_SLIDING = 0.9
 # Largest factor by which the coefficients of friction are multiplied to test whether friction can hold a body.
 LARGEST_FRICTION_FACTOR = 100.0
 # Largest number of motions of parts between hinges. A mesh with more motions is defective.
-MOST_MOTIONS = 1500
+MAX_MOTIONS = 1500
 
 
 class Label(NamedTuple):
@@ -138,8 +138,8 @@ def _column_echelon_form(A: Array) -> Array:
             continue
         A[:, [column, pivot]] = A[:, [pivot, column]]
         A[:, column] /= row[column]
-        others = np.arange(A.shape[1]) != column
-        A[:, others] -= A[:, [column]] * row[others]
+        is_other = np.arange(A.shape[1]) != column
+        A[:, is_other] -= A[:, [column]] * row[is_other]
         column += 1
     return A
 
@@ -201,11 +201,11 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
 
 def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     """Return the motions of bodies, and of their parts between hinges, that the supports `fixed` (n_points, dim) allow."""
-    rigid = _parts_of(mesh, kinematics)
+    body_parts = _parts_of(mesh, kinematics)
     part_motions: list[tuple[Indices, Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
     matrices, labels = [np.empty((0, 0))], []
-    for number in range(rigid.count):
-        members = rigid.nodes_of(number)
+    for number in range(body_parts.count):
+        members = body_parts.nodes_of(number)
         modes = rigid_modes(mesh.points[members], kinematics)
         arms = np.abs(modes).max(axis=0)
         modes = modes / arms
@@ -213,20 +213,20 @@ def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
         part_motions.append((members, (modes @ free).reshape(len(members), mesh.dim, -1)))
         if free.shape[1]:
             matrices.append(free)
-            name, centre = _part_name(mesh, rigid, number), mesh.points[members].mean(axis=0)
+            name, centre = _part_name(mesh, body_parts, number), mesh.points[members].mean(axis=0)
             labels += [
                 Label(name, motion, centre if motion.startswith("rotation") else None, float(arm))
                 for motion, arm in zip(MODE_NAMES[kinematics], arms, strict=True)
             ]
-    joint = _joint_motions(mesh, rigid, part_motions)
-    coefficients = np.split(joint, np.cumsum([motion.shape[2] for _, motion in part_motions]))
-    displacement = np.zeros((mesh.n_points, mesh.dim, joint.shape[1]))
+    combinations = _joint_motions(mesh, body_parts, part_motions)
+    coefficients = np.split(combinations, np.cumsum([motion.shape[2] for _, motion in part_motions]))
+    displacement = np.zeros((mesh.n_points, mesh.dim, combinations.shape[1]))
     for number, ((members, motion), weights) in enumerate(zip(part_motions, coefficients[:-1], strict=True)):
-        in_part = rigid.part[members] == number  # a node at a hinge belongs to several parts
+        in_part = body_parts.part[members] == number  # a node at a hinge belongs to several parts
         displacement[members[in_part]] = motion[in_part] @ weights
     return FreeMotions(
-        displacement.reshape(mesh.points.size, joint.shape[1]), np.asarray(block_diag(*matrices), float) @ joint, labels,
-        np.unique(rigid.hinge_node),
+        displacement.reshape(mesh.points.size, combinations.shape[1]),
+        np.asarray(block_diag(*matrices), float) @ combinations, labels, np.unique(body_parts.hinge_node),
     )  # fmt: skip
 
 
@@ -239,22 +239,22 @@ def _parts_of(mesh: Mesh, kinematics: str) -> RigidParts:
     return RigidParts(count, body.astype(np.intp), np.empty(0, np.intp), np.empty(0, np.intp))
 
 
-def _joint_motions(mesh: Mesh, rigid: RigidParts, part_motions: list[tuple[Indices, Array]]) -> Array:
+def _joint_motions(mesh: Mesh, body_parts: RigidParts, part_motions: list[tuple[Indices, Array]]) -> Array:
     """Return the combinations (k, j) of the motions of all parts for which the parts remain connected at hinges."""
     width = sum(motion.shape[2] for _, motion in part_motions)
-    if not len(rigid.hinge_node):
+    if not len(body_parts.hinge_node):
         return np.eye(width)
-    if width > MOST_MOTIONS:
+    if width > MAX_MOTIONS:
         raise ModelError(
-            f"the mesh consists of {rigid.count} parts that are connected only at single nodes or along lines (first: "
-            f"{node_at(mesh, rigid.hinge_node[0])}): let cells share whole facets"
+            f"the mesh consists of {body_parts.count} parts that are connected only at single nodes or along lines (first: "
+            f"{node_at(mesh, body_parts.hinge_node[0])}): let cells share whole facets"
         )
     ends = np.cumsum([0] + [motion.shape[2] for _, motion in part_motions])
-    at_hinges = np.zeros((len(rigid.hinge_node), mesh.dim, width))
-    for row, (node, number) in enumerate(zip(rigid.hinge_node, rigid.hinge_part, strict=True)):
+    at_hinges = np.zeros((len(body_parts.hinge_node), mesh.dim, width))
+    for row, (node, number) in enumerate(zip(body_parts.hinge_node, body_parts.hinge_part, strict=True)):
         members, motion = part_motions[number]
         at_hinges[row, :, ends[number] : ends[number + 1]] = motion[np.searchsorted(members, node)]
-    same_node = rigid.hinge_node[1:] == rigid.hinge_node[:-1]
+    same_node = body_parts.hinge_node[1:] == body_parts.hinge_node[:-1]
     return _null_space((at_hinges[1:] - at_hinges[:-1])[same_node].reshape(int(same_node.sum()) * mesh.dim, width))
 
 
@@ -263,10 +263,10 @@ def node_at(mesh: Mesh, node: int) -> str:
     return f"point {node} at ({', '.join(f'{x:.6g}' for x in mesh.points[node])})"
 
 
-def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
+def _part_name(mesh: Mesh, body_parts: RigidParts, number: int) -> str:
     """Return the name of a body, or of a part of a body with the first node at which it is connected to other parts."""
     _, body = bodies(mesh)
-    members, hinges = rigid.nodes_of(number), rigid.hinges_of(number)
+    members, hinges = body_parts.nodes_of(number), body_parts.hinges_of(number)
     name = f"body {body_name(mesh, body, int(body[members[0]]))}"
     if not len(hinges):
         return name

@@ -14,7 +14,7 @@ VERSION_4, VERSION_4_0 = b"4", b"4.0"
 # Position of the number of physical groups in a line of $Entities, after the number of the entity and its bounding box.
 GROUPS_OF_ENTITY = 7
 # Largest number of words into which the line of a cell is split, more than the largest element has.
-MOST_WORDS = 200
+MAX_WORDS = 200
 
 
 def readable_file(path: Path, folder: Path) -> Path:
@@ -59,7 +59,7 @@ def _write_version_2(path: Path, target: Path) -> None:
         file.writelines(f"{line}\n" for line in _section(path, lines, "NOD"))
         file.write("$EndNodes\n$Elements\n")
         for number, line in enumerate(_section(path, lines, "ELM")):
-            words = line.split(None, MOST_WORDS)
+            words = line.split(None, MAX_WORDS)
             if number and (len(words) < 6 or not words[4].isdigit() or len(words) != 5 + int(words[4])):
                 raise FileError(f"'{path}': the line of its cell {number} is damaged: '{line[:60]}'")
             file.write(" ".join([*words[:2], "2", *words[2:4], *words[5:]] if number else words) + "\n")

@@ -126,12 +126,12 @@ def _order(step: Any) -> tuple[int, int]:
 def _read_points(step: Any, mesh: Any) -> Array:
     """Return the node coordinates (n_points, dim) [length]. Raises MeshError unless they are Cartesian and complete."""
     flat = values(step["NOE"], "COO")
-    stored = step["NOE"]["COO"]
-    system = int(attribute(mesh if "REP" in mesh.attrs else stored, "REP", 0))
+    dataset = step["NOE"]["COO"]
+    system = int(attribute(mesh if "REP" in mesh.attrs else dataset, "REP", 0))
     if system != 0:
         kind = {1: "cylindrical", 2: "spherical"}.get(system, f"of kind {system}")
         raise MeshError(f"its coordinates are {kind}: convert them to Cartesian ones")
-    count = int(attribute(stored, "NBR"))
+    count = int(attribute(dataset, "NBR"))
     dim = len(flat) // max(count, 1)
     if count == 0 or dim * count != len(flat):
         raise MeshError(f"it has {len(flat)} coordinates for {count} nodes: check that the file is complete")

@@ -28,7 +28,7 @@ NODE_ORDER: dict[str, Orders] = {
 INCONSISTENCY_ERRORS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 VERTEX = "vertex"
 # Largest number of unknown kinds of cells in a message, and of characters of each name.
-MOST_SHOWN = 12
+MAX_SHOWN = 12
 Groups = dict[str, AnyArray]
 
 
@@ -159,13 +159,13 @@ def build_mesh(
     return Mesh(_without_flat_z(coordinates, dim), cells, cell_groups, all_point_groups), omitted
 
 
-def check_kinds(unknown: Mapping[str, int], known: Iterable[str]) -> None:
+def check_kinds(unknown: Mapping[str, int], known_kinds: Iterable[str]) -> None:
     """Raise MeshError if there are cells of unknown kinds, whose numbers `unknown` contains by kind."""
     if unknown:
-        listed = [f"{count} cells of kind {kind[:MOST_SHOWN]}" for kind, count in list(unknown.items())[:MOST_SHOWN]]
-        more = [f"{len(unknown) - MOST_SHOWN} kinds more"] if len(unknown) > MOST_SHOWN else []
+        listed = [f"{count} cells of kind {kind[:MAX_SHOWN]}" for kind, count in list(unknown.items())[:MAX_SHOWN]]
+        more = [f"{len(unknown) - MAX_SHOWN} kinds more"] if len(unknown) > MAX_SHOWN else []
         kinds = ", ".join([*listed, *more])
-        raise MeshError(f"it has {kinds}, which fastcontact does not know: use only {', '.join(sorted(known))}")
+        raise MeshError(f"it has {kinds}, which fastcontact does not know: use only {', '.join(sorted(known_kinds))}")
 
 
 def merge_blocks(blocks: Iterable[Block]) -> list[Block]:
@@ -204,10 +204,10 @@ def _add_vertices(point_groups: Groups, block: Block, cell_blocks: list[Block]) 
             point_groups[name] = np.union1d(point_groups.get(name, points[:0]), points)
             converted.append(name)
             continue
-        lost = np.setdiff1d(points, np.concatenate(nodes_of_cells))
-        if len(lost):
+        omitted_points = np.setdiff1d(points, np.concatenate(nodes_of_cells))
+        if len(omitted_points):
             warn(
-                f"group '{name}' mixes cells with single points: {len(lost)} points that its cells do "
+                f"group '{name}' mixes cells with single points: {len(omitted_points)} points that its cells do "
                 "not have are left out; put them into a separate group"
             )
     return converted

@@ -306,7 +306,7 @@ def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -
     with _captured_output("read back", path):
         content = library().read(temporary, file_format=file_format)
     cells = _meshio_cells(mesh, {})
-    different = [kind for kind, block in cells if not np.array_equal(content.get_cells_type(kind), block)]
-    if different or len(content.points) != mesh.n_points:
-        listed = f"the {', '.join(different)} cells" if different else "the points"
+    differing_kinds = [kind for kind, block in cells if not np.array_equal(content.get_cells_type(kind), block)]
+    if differing_kinds or len(content.points) != mesh.n_points:
+        listed = f"the {', '.join(differing_kinds)} cells" if differing_kinds else "the points"
         raise FileError(f"'{path}': meshio's {file_format} format does not keep {listed}; {OTHER_FORMATS}")

@@ -16,8 +16,8 @@ FACES = TRIANGLES + QUADRANGLES
 LARGEST = 1e100
 # Largest numbers of segments of a line and of cells of a mesh. Larger numbers are probably due to wrong units or
 # decimal points.
-MOST_SEGMENTS = 1_000_000
-MOST_CELLS = 5_000_000
+MAX_SEGMENTS = 1_000_000
+MAX_CELLS = 5_000_000
 
 Number = TypeVar("Number", int, float)
 
@@ -63,30 +63,30 @@ def within(name: str, value: Any, low: float, high: float) -> float:
 
 
 def count(name: str, value: Any) -> int:
-    """Return `value` as an int. Raises MeshError unless it is an integer from 1 to MOST_SEGMENTS."""
+    """Return `value` as an int. Raises MeshError unless it is an integer from 1 to MAX_SEGMENTS."""
     result = number(name, value)
     if result != int(result) or result < 1:
         raise MeshError(f"{name} = {repr(value)} is out of range: it must be a whole number, at least 1")
-    if result > MOST_SEGMENTS:
-        raise MeshError(f"{name} = {repr(value)} is out of range: it must be at most {MOST_SEGMENTS}")
+    if result > MAX_SEGMENTS:
+        raise MeshError(f"{name} = {repr(value)} is out of range: it must be at most {MAX_SEGMENTS}")
     return int(result)
 
 
 def segments(quotient: float) -> int:
     """Return `quotient` rounded up to a number of segments, at least 1. Raises MeshError if it is too large."""
-    if not quotient <= MOST_SEGMENTS:
+    if not quotient <= MAX_SEGMENTS:
         raise MeshError(
-            f"a line of the mesh would be divided into {quotient:.3g} segments, more than {MOST_SEGMENTS}: check the units "
+            f"a line of the mesh would be divided into {quotient:.3g} segments, more than {MAX_SEGMENTS}: check the units "
             "of the element sizes, or request larger elements"
         )
     return max(1, math.ceil(quotient - 1e-9))
 
 
 def check_size(n_cells: float) -> None:
-    """Raise MeshError if a mesh has more than about MOST_CELLS cells."""
-    if not n_cells <= MOST_CELLS:
+    """Raise MeshError if a mesh has more than about MAX_CELLS cells."""
+    if not n_cells <= MAX_CELLS:
         raise MeshError(
-            f"the mesh would have about {n_cells:.3g} cells, more than {MOST_CELLS}: check the units of the element sizes, "
+            f"the mesh would have about {n_cells:.3g} cells, more than {MAX_CELLS}: check the units of the element sizes, "
             "or request larger elements or fewer divisions"
         )
 

@@ -31,7 +31,7 @@ class _Pattern:
     points of each child. `shape` (m, n_nodes) [-] contains the shape functions of the parent at the new points. `edge_number`
     (m,) is the number of the edge of the parent on which a new point lies, -1 inside the parent, and `quarters` (m,) its
     distance from the start of this edge in quarters of the length. `parents` (m, n_nodes) is true for the nodes of this edge,
-    and inside the parent for all nodes.
+    or for all nodes if the point lies inside the parent.
     """
 
     children: AnyArray

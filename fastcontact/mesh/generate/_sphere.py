@@ -183,10 +183,10 @@ def _depth_spacing(spacing: Spacing) -> Spacing:
     return Spacing(spacing.near, spacing.far, plateau=spacing.plateau - shift, reach=spacing.reach - shift)
 
 
-def _mapped_box(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
-    """Return a box with the given grid lines, mapped by `place`. It has the groups that are keys of `names`, renamed."""
+def _mapped_box(element: str, grid: Sequence[Array], mapping: Map, solid: str, names: Mapping[str, str]) -> Mesh:
+    """Return a box with the given grid lines, mapped by `mapping`. It has the groups that are keys of `names`, renamed."""
     lattice = mesh_on_lines(element, grid, solid)
     sides = {side: lattice.cells_of(side) for side in lattice.cell_groups if side in names and side != solid}
-    body = Mesh(place(*lattice.points.T), lattice.solids, {solid: lattice.cell_groups[solid]})
+    body = Mesh(mapping(*lattice.points.T), lattice.solids, {solid: lattice.cell_groups[solid]})
     mesh = body.with_facets(sides)
     return renamed(mesh.replace(cell_groups={name: mesh.cell_groups[name] for name in names}), dict(names))

@@ -296,7 +296,7 @@ def _sweep(points: Array, movable: Mask, edges: Indices, stars: Indices, limit: 
     quality[movable] = _star_quality(points[movable, None], points, stars[movable], limit[movable])[:, 0]
     quality[quality >= _GOOD_SINE] = np.inf
     moved = False
-    for _ in range(6):
+    for _ in range(6):  # sets of points that share no edge
         neighbours = np.full(len(points), np.inf)
         np.minimum.at(neighbours, edges[:, 0], quality[edges[:, 1]])
         np.minimum.at(neighbours, edges[:, 1], quality[edges[:, 0]])

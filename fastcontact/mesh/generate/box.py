@@ -91,8 +91,8 @@ def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     weights = np.array([n_y * n_z, n_z, 1])
     first = STEPS * np.indices(tuple(shape.tolist())).reshape(3, -1).T @ weights
     positions = first[:, None, None] + np.rint(local).astype(np.int64) @ weights
-    used, block = np.unique(positions, return_inverse=True)
-    lattice = np.column_stack([used // (n_y * n_z), used // n_z % n_y, used % n_z])
+    used_positions, block = np.unique(positions, return_inverse=True)
+    lattice = np.column_stack([used_positions // (n_y * n_z), used_positions // n_z % n_y, used_positions % n_z])
     return block.reshape(-1, solid.n_nodes), lattice
 
 

@@ -16,7 +16,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
 
 # Largest number of nodes of a facet.
-MOST_NODES = 9
+MAX_NODES = 9
 
 
 @typed(MeshError)
@@ -94,7 +94,7 @@ class _Sides(NamedTuple):
     cell: Indices
     is_facet: Mask
     row: Indices
-    nodes: Indices  # distinct sets of nodes in ascending order, filled with -1 (n_rows, MOST_NODES)
+    nodes: Indices  # distinct sets of nodes in ascending order, filled with -1 (n_rows, MAX_NODES)
 
 
 def _sides_at(mesh: Mesh, marked: Mask) -> _Sides:
@@ -104,7 +104,7 @@ def _sides_at(mesh: Mesh, marked: Mask) -> _Sides:
         element, rows = elements.get(name), np.flatnonzero(marked[block].any(axis=1))
         for side in element.facets if element.dim == mesh.dim else [range(element.n_nodes)]:
             sets = np.sort(block[rows][:, list(side)], axis=1)
-            nodes.append(np.pad(sets, ((0, 0), (0, MOST_NODES - len(side))), constant_values=-1))
+            nodes.append(np.pad(sets, ((0, 0), (0, MAX_NODES - len(side))), constant_values=-1))
             cell.append(mesh.offsets[name] + rows)
             is_facet.append(np.full(len(rows), element.dim < mesh.dim))
     distinct, row = np.unique(np.concatenate(nodes), axis=0, return_inverse=True)

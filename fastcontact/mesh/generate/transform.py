@@ -45,13 +45,13 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
     ['BLOCK', 'BOTTOM', 'RIGHT', 'LID']
     """
 
-    def groups(old: Mapping[str, AnyArray]) -> Groups:
-        new: Groups = {}
-        for name, members in old.items():
+    def groups(old_groups: Mapping[str, AnyArray]) -> Groups:
+        new_groups: Groups = {}
+        for name, members in old_groups.items():
             target = names(name) if callable(names) else names.get(name, name)
             if target is not None:
-                new[target] = np.union1d(new[target], members) if target in new else members
-        return new
+                new_groups[target] = np.union1d(new_groups[target], members) if target in new_groups else members
+        return new_groups
 
     return mesh.replace(cell_groups=groups(mesh.cell_groups), point_groups=groups(mesh.point_groups))
 

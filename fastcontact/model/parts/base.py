@@ -297,13 +297,13 @@ class ModelBase(NameSuggestions):
 
     def _check_material(self, index: int, group: str | None, numbers: Numbers) -> None:
         """Raise ModelError if cells already have a different material, unless that one was assigned to all cells."""
-        new = self.materials[index][0]
+        new_material = self.materials[index][0]
         for number in np.unique(numbers[numbers >= 0]):
-            old, groups = self.materials[number]
-            if old != new and (groups is not None or group is None):
+            old_material, groups = self.materials[number]
+            if old_material != new_material and (groups is not None or group is None):
                 raise ModelError(
                     f"{int((numbers == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
-                    f"materials, {old.described} and {new.described}: assign one to each group; "
+                    f"materials, {old_material.described} and {new_material.described}: assign one to each group; "
                     "the material of all other cells must be assigned first, without groups"
                 )
 

@@ -211,9 +211,9 @@ class ModelSupports(ModelContact):
             for history in {**by_ramp, **histories}:
                 total = by_ramp.setdefault(history, np.zeros(self.mesh.points.shape))
                 values = histories.get(history, np.zeros(len(nodes)))
-                different = np.flatnonzero((total[nodes, k] != values) & ~is_new)
-                if len(different):
-                    self._raise_contradiction(number, int(nodes[different[0]]))
+                rows = np.flatnonzero((total[nodes, k] != values) & ~is_new)
+                if len(rows):
+                    self._raise_contradiction(number, int(nodes[rows[0]]))
                 total[nodes[is_new], k] = values[is_new]
             fixed[nodes, k] = True
         self._fix_axis(fixed, by_ramp)

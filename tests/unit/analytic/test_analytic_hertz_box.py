@@ -157,7 +157,7 @@ def test_leaving_out_a_row_bounds_the_error_of_interpolation():
     table = _finite_spheres._table()
     errors = {}
     for i in range(1, len(table) - 1):
-        found = _finite_spheres._interpolated(np.delete(table, i, axis=0), table[i, 0])
+        found = _finite_spheres._interpolate(np.delete(table, i, axis=0), table[i, 0])
         errors[table[i, 0]] = np.abs(np.array(found) / table[i, 1:] - 1.0)
     worst = np.max(list(errors.values()), axis=0)
     large = np.max([error for x, error in errors.items() if x > 0.0079], axis=0)

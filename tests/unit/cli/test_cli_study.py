@@ -69,7 +69,7 @@ def test_an_interrupted_study_says_how_to_go_on(store, told):
     ],
 )
 def test_values_of_a_parameter(text, values):
-    name, found = sweep.values(text)
+    name, found = sweep.parse_setting(text)
     assert name == text.split("=")[0]
     assert found == pytest.approx(values) if isinstance(values[0], float) else found == values
 

@@ -92,7 +92,7 @@ def test_relations_and_springs_stop_a_hinge():
 
 
 def test_a_mesh_that_falls_into_very_many_parts_is_refused_at_once(monkeypatch):
-    monkeypatch.setattr(rigid_motions, "MOST_MOTIONS", 4)
+    monkeypatch.setattr(rigid_motions, "MAX_MOTIONS", 4)
     with pytest.raises(fc.ModelError, match=r"consists of 2 parts .*first: point \d+ at \(1, 1\)\): let cells share"):
         elastic_model(squares()).check()
 

@@ -286,10 +286,10 @@ def test_relations_that_hold_nodes_inside_are_told_at_the_end():
 
 
 def test_a_long_history_is_looked_at_in_some_instants():
-    from fastcontact.model.prescribed_overlap import MOST_INSTANTS, Supports
+    from fastcontact.model.prescribed_overlap import MAX_INSTANTS, Supports
 
     supports = Supports(np.zeros((1, 2), bool), {}, fc.linear_ramp(1000))
-    assert len(supports.instants()) == MOST_INSTANTS
+    assert len(supports.instants()) == MAX_INSTANTS
     assert supports.instants()[0] == 0.001
     assert supports.instants()[-1] == 1.0
 
