@@ -293,7 +293,7 @@ if TYPE_CHECKING:
 STEP_COLUMNS = ("step", "load_factor", "contact")
 
 
-def library(name: str, title: str, install: str) -> Any:
+def import_library(name: str, title: str, install: str) -> Any:
     """Import a library. Raises FileError with the installation command if the library is missing."""
     try:
         return importlib.import_module(name)
@@ -302,7 +302,7 @@ def library(name: str, title: str, install: str) -> Any:
 
 
 def _pyvista() -> Any:
-    return library("pyvista", "PyVista", "'fastcontact[view]'")
+    return import_library("pyvista", "PyVista", "'fastcontact[view]'")
 
 
 def grid(mesh: Mesh, step: StepResult) -> Any:
@@ -333,7 +333,7 @@ def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
 
 def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | None = None) -> pandas.DataFrame:
     """Return a table as a ``pandas.DataFrame``; its ``attrs["units"]`` contains the known units by column."""
-    frame = library("pandas", "pandas", "'fastcontact[table]'").DataFrame(table, columns=columns)
+    frame = import_library("pandas", "pandas", "'fastcontact[table]'").DataFrame(table, columns=columns)
     if known := {name: text for name, text in units.items() if text}:
         frame.attrs["units"] = known
     return cast("pandas.DataFrame", frame)
@@ -341,7 +341,7 @@ def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | No
 
 def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pandas.DataFrame:
     """Return the contact tables of all steps as one ``pandas.DataFrame``, in which the `STEP_COLUMNS` come first."""
-    concat = library("pandas", "pandas", "'fastcontact[table]'").concat
+    concat = import_library("pandas", "pandas", "'fastcontact[table]'").concat
     frames = []
     for step in steps:
         for name, contact in step.contact.items():
@@ -356,7 +356,7 @@ def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pand
 
 def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
     """Return an ``xarray.Dataset`` of steps with the dimensions step, point, axis, stress_component and contact."""
-    xarray, all_steps, dim = library("xarray", "xarray", "xarray"), list(steps), mesh.dim
+    xarray, all_steps, dim = import_library("xarray", "xarray", "xarray"), list(steps), mesh.dim
     pairs = list(dict.fromkeys(name for step in all_steps for name in step.contact))
     components = list(STRESS_COMPONENTS[: 4 if dim == 2 else 6])
 

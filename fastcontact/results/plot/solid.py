@@ -131,11 +131,11 @@ TICK_LABEL_DISTANCE, AXIS_LABEL_DISTANCE, SMALLEST_BOX = 6.0, 17.0, 0.05
 
 def draw_solid(
     ax: Any, plot_field: Field, points: Array, edges: bool | None, view: tuple[float, float],
-    colours: tuple[float, float],
+    limits: tuple[float, float],
 ) -> Any:  # fmt: skip
     """Draw the visible part of the outer surface, and return the mappable for a colour bar.
 
-    `points` (n_points, 3) are the positions of the points [length], and `colours` are the values of the first and the last
+    `points` (n_points, 3) are the positions of the points [length], and `limits` are the values of the first and the last
     colour. `edges` states whether the outlines of facets are drawn; by default they are for up to MOST_EDGES facets. `view`
     contains the elevation and the azimuth of the viewer [degree].
     """
@@ -154,7 +154,7 @@ def draw_solid(
         pieces.append(visible)
         values.append(visible_values.mean(axis=1))
         strokes.append(_visible_strokes(_outline(name, corners), screen))
-    norm = Normalize(*colours)
+    norm = Normalize(*limits)
     faces = colormaps[plot_field.colours](norm(np.concatenate(values)))
     polygons = list(np.concatenate(pieces))
     lines = faces.copy()  # lines in the colour of the face close hairline gaps between faces
