@@ -348,14 +348,14 @@ class Results(StepSequence):
             return StepResult(
                 index=int(self._rows["index"][number]),
                 load_factor=float(self._rows["load_factor"][number]),
-                contact=self._contact(number, dict(notes["contact"])),
+                contact=self._read_contacts(number, dict(notes["contact"])),
                 iterations=notes["iterations"],
                 warnings=tuple(notes["warnings"]),
-                cell_fields=self._cell_fields(number),
+                cell_fields=self._read_cell_fields(number),
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
                 material_stress=self._material_stress(number),
                 units=self.units,
-                **{k: self._field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in stored},
+                **{k: self._read_field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in stored},
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
@@ -398,7 +398,7 @@ class Results(StepSequence):
         others = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in others]
 
-    def _cell_fields(self, number: int) -> dict[str, Array]:
+    def _read_cell_fields(self, number: int) -> dict[str, Array]:
         data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
         fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
         for name, values in fields.items():
@@ -406,7 +406,7 @@ class Results(StepSequence):
                 raise ValueError(f"{name} of step {number} is truncated, or has the wrong shape or type")
         return fields
 
-    def _field(self, name: str, number: int, shape: tuple[int, ...]) -> Array:
+    def _read_field(self, name: str, number: int, shape: tuple[int, ...]) -> Array:
         n = self.mesh.n_points
         rows = slice(number * n, (number + 1) * n)
         values = self._file["VTKHDF/PointData"][name][(rows, *map(slice, shape[1:]))]
@@ -414,7 +414,7 @@ class Results(StepSequence):
             raise ValueError(f"{name} of step {number} is truncated, or has the wrong shape or type")
         return values
 
-    def _contact(self, number: int, formulations: Mapping[str, str]) -> dict[str, ContactResult]:
+    def _read_contacts(self, number: int, formulations: Mapping[str, str]) -> dict[str, ContactResult]:
         pairs = {_read_json(pair["name"], self._raw): pair for pair in self._file["fastcontact/contact"].values()}
         contacts = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
         for name, contact in contacts.items():

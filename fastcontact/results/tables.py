@@ -78,10 +78,10 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         "gap": contact.gap,
         "pressure": contact.pressure,
         "multiplier": contact.multiplier,
-        **_by_axis("force_", contact.force_vectors),
-        **_by_axis("shear_", contact.shear),
-        **_by_axis("slip_", contact.slip),
-        **_by_axis("slip_total_", contact.slip_total),
+        **_components("force_", contact.force_vectors),
+        **_components("shear_", contact.shear),
+        **_components("slip_", contact.slip),
+        **_components("slip_total_", contact.slip_total),
         **{name: values for name in layout.OPTIONAL_COLUMNS if (values := getattr(contact, name)) is not None},
         "active": contact.active,
         "sticking": contact.sticking,
@@ -267,19 +267,19 @@ def _columns(table: AnyArray) -> Columns:
     return {name: table[name] for name in table.dtype.names}
 
 
-def _by_axis(prefix: str, vectors: AnyArray) -> Columns:
+def _components(prefix: str, vectors: AnyArray) -> Columns:
     return {f"{prefix}{axis}": vectors[:, i] for i, axis in enumerate(AXES[: vectors.shape[1]])}
 
 
 def _positions(points: AnyArray, coordinates: AnyArray, abscissa: AnyArray) -> Columns:
-    return {"point": points, **_by_axis("", coordinates), "abscissa": abscissa}
+    return {"point": points, **_components("", coordinates), "abscissa": abscissa}
 
 
 def _fields(step: StepResult, points: AnyArray) -> Columns:
     """Return the columns of displacement, stress and von Mises stress at `points` (m,)."""
     stress = step.stress[points]
     return {
-        **_by_axis("displacement_", step.displacement[points]),
+        **_components("displacement_", step.displacement[points]),
         **{f"stress_{name}": stress[:, i] for i, name in enumerate(STRESS_COMPONENTS[: stress.shape[1]])},
         "von_mises": step.von_mises[points],
         "von_mises_signed": step.von_mises_signed[points],

@@ -307,7 +307,7 @@ def adaptive_study(
     setup = settings(case)
     quantities.check_names(case, [quantity, *setup.quantities])
     combination = matching_combination(setup, element, formulation)
-    forest, curves = _first_mesh(case, setup, combination)
+    forest, curves = _first_forest(case, setup, combination)
     rounds: list[Round] = []
     with StatusLine(80, progress) as line:
         while True:
@@ -329,7 +329,7 @@ def adaptive_study(
         rounds=rounds, case=round_case, last=last, error=error)  # fmt: skip
 
 
-def _first_mesh(case: Case, setup: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
+def _first_forest(case: Case, setup: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
     """Return the first mesh as a forest of linear cells, which can be refined, and the curves of its boundary."""
     mesh = case.mesh
     if setup.by_shape and combination.element is not None:

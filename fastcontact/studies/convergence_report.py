@@ -148,7 +148,7 @@ def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
 
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each quantity with a limit: limit, order, theory and errors."""
-    cells = [[column(title(name), name, units), *_cells(series, name, LIMIT_COLUMNS)] for name in series.limits]
+    cells = [[column(title(name), name, units), *_limit_entries(series, name, LIMIT_COLUMNS)] for name in series.limits]
     nonempty = [any(row[index] != "-" for row in cells) for index in range(len(LIMIT_COLUMNS) + 1)]
     return [list(itertools.compress(row, nonempty)) for row in (["quantity", *LIMIT_COLUMNS], *cells)]
 
@@ -163,12 +163,12 @@ def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], uni
     rows = []
     for series in all_series:
         rows.append([str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)])
-        rows[-1] += [text for name in quantities for text in _cells(series, name, columns)]
-        rows[-1] += _cells(series, "pressure_max", ["at equal force"] * len(at_force))
+        rows[-1] += [text for name in quantities for text in _limit_entries(series, name, columns)]
+        rows[-1] += _limit_entries(series, "pressure_max", ["at equal force"] * len(at_force))
     return [header + at_force, *rows]
 
 
-def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
+def _limit_entries(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
     """Return the entries of some columns of limits for a quantity; dashes if it has no limit."""
     limit, split = series.limits.get(quantity), series.split(quantity)
     if limit is None:

@@ -198,7 +198,7 @@ def _stress_in_cells(
 def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, cell_arrays: CellArrays) -> Array:
     """Return the squares (4,) of the norms over some cells, in the order of the attributes of `ErrorNorms`."""
     N, stress, volume, elastic = cell_arrays
-    exact_u, exact_stress = _exact(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
+    exact_u, exact_stress = _exact_fields(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
         elastic_energy(stress - exact_stress, elastic), (error_u**2).sum(axis=-1),
@@ -207,7 +207,7 @@ def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, cell
     return np.array([(density * volume).sum() for density in densities])
 
 
-def _exact(theory: Theory, positions: Array, n_components: int) -> tuple[Array, Array]:
+def _exact_fields(theory: Theory, positions: Array, n_components: int) -> tuple[Array, Array]:
     """Return displacements and stresses (n_cells, n_q, ...) of a theory at `positions` (n_cells, n_q, dim) [length]."""
     points = positions.reshape(-1, positions.shape[2])
     fields = []

@@ -102,7 +102,7 @@ def _contact_quantities(case: Case, contact: ContactResult, pair: str) -> dict[s
     quantities = _pressure_quantities(contact)
     theory: Any = case.theories.get(pair, {}).get("theory")
     if case.mesh.dim == 2 and pressure_curve(theory) is not None:
-        side = secondary(case, pair)
+        side = secondary_surface(case, pair)
         quantities["pressure_error"] = pressure_error(case, side, contact, theory)
         if hasattr(theory, "at_force") and quantities["force"] > 0:
             at_force = theory.at_force(quantities["force"] / case.theories[pair]["share"])
@@ -110,7 +110,7 @@ def _contact_quantities(case: Case, contact: ContactResult, pair: str) -> dict[s
     return {name: value for name, value in quantities.items() if np.isfinite(value)}
 
 
-def secondary(case: Case, pair: str) -> Surface:
+def secondary_surface(case: Case, pair: str) -> Surface:
     """Return the secondary surface of a contact pair."""
     return surface(case.mesh, next(p.secondary for p in case.model.contact if p.name == pair))
 
@@ -245,7 +245,7 @@ def mesh_size(case: Case, pair: str | None) -> float:
     if pair is None:
         return quality(case.mesh).shortest_edge
     shortest = np.inf
-    for block in secondary(case, pair).blocks:
+    for block in secondary_surface(case, pair).blocks:
         facet, points = elements.get(block.element), case.mesh.points[block.facets]
         for a, b in facet.edges if facet.dim == 2 else ((0, 1),):
             shortest = min(shortest, float(np.linalg.norm(points[:, b] - points[:, a], axis=1).min()))

@@ -346,7 +346,7 @@ def parameter_sweep(
     results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
         **report_fields(case),
-        **_points(parameters, choices, results),
+        **_sweep_fields(parameters, choices, results),
         combination=str(jobs[0].marks["combination"]),
         theories=_theory_curves(case, parameters, jobs[0].pair),
         asked=names,
@@ -370,7 +370,7 @@ def _sweep_of_function(
         for choice, call in zip(choices, calls, strict=True)
     ]
     results = run_functions(runs, "no point of the sweep could be solved", **options)
-    points = _points(values, choices, results)
+    points = _sweep_fields(values, choices, results)
     return Sweep(**function_fields(function, results), **points, combination=name, asked=tuple(quantities), compared="")
 
 
@@ -382,7 +382,7 @@ def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]
     return [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
 
 
-def _points(
+def _sweep_fields(
     parameters: Mapping[str, Sequence[Value]], choices: Sequence[dict[str, Value]], results: Sequence[Result]
 ) -> dict[str, Any]:
     """Return the fields of a `Sweep` that describe its parameters and points."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembly, Element
+from fastcontact.cases.decks.assembled import Assembly, Element, qualified
 from fastcontact.cases.decks.blocks import Block, Location, key_of, look_up, register, unquoted
 from fastcontact.cases.decks.content import Axes, Content, Part
 from fastcontact.mesh.mesh import starts_of
@@ -96,7 +96,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
             default = frame
             continue
         for scope in scopes:
-            for element in assembly.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
+            for element in assembly.elements_of(qualified(scope, row.text(0)), row.location):
                 frame_of[id(element)] = frame
     starts = starts_of(assembly.solids_by_type)
     frames = np.tile(np.eye(3), (len(assembly.solids), 1, 1))
