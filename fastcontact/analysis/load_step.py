@@ -42,7 +42,7 @@ from fastcontact.elasticity.loads import Pressure
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.model.pretension import section_results
 from fastcontact.model.rigid_motions import generalised_forces
-from fastcontact.results.step import ContactResult, StepResult, by_largest_von_mises
+from fastcontact.results.step import ContactResult, StepResult, nodal_stress_of_materials
 from fastcontact.results.units import units_of_results
 
 nodal_stress = unchecked(recovery.nodal_stress)
@@ -309,7 +309,7 @@ def recover(
     by_material = None
     if len(problem.sides.points):
         materials_of_cells = np.concatenate(list(problem.field.distinct.values()))
-        stress, by_material = by_largest_von_mises(problem.sides, materials_of_cells, stress, mesh.n_points)
+        stress, by_material = nodal_stress_of_materials(problem.sides, materials_of_cells, stress, mesh.n_points)
     equivalent, units = von_mises(stress), problem.model.units
     return StepResult(
         *instant, u.copy(), stress, equivalent, von_mises_signed(stress, equivalent), reaction, contact,

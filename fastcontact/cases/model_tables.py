@@ -196,7 +196,7 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, functions: Mapp
             check_keys(where, entry, known, required)
             with errors_at(where):
                 values = _read_fields(where, entry, model.mesh, folder) if kind == "material" else entry
-                add(model, **_arguments(where, _resolve(folder, _convert(where, values, VARYING, _interpolant))))
+                add(model, **_arguments(where, _resolve_paths(folder, _convert(where, values, VARYING, _interpolant))))
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
@@ -231,7 +231,7 @@ def _read_fields(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) ->
             raise CaseError(f"'{name}' needs 'field', the name of the field in the file")
         from fastcontact.mesh.files.mesh_fields import read_field
 
-        return read_field(mesh, groups=entry.get("groups"), **_resolve(folder, value))
+        return read_field(mesh, groups=entry.get("groups"), **_resolve_paths(folder, value))
 
     return _convert(where, entry, CONSTANTS, read)
 
@@ -253,7 +253,7 @@ def _convert(
     return values
 
 
-def _resolve(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
+def _resolve_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     """Return an entry with the paths in `file` resolved relative to the folder of the case file."""
     file = entry.get("file")
     if file is None:

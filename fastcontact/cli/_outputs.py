@@ -60,9 +60,9 @@ def _check_formats(paths: list[str]) -> None:
     try:
         from matplotlib.backend_bases import FigureCanvasBase
     except (ImportError, ValueError) as error:
-        from fastcontact.results.plot._axes import without_matplotlib
+        from fastcontact.results.plot._axes import matplotlib_error
 
-        raise without_matplotlib(error) from error
+        raise matplotlib_error(error) from error
     formats = FigureCanvasBase.get_supported_filetypes()
     for path in paths:
         if Path(path).suffix[1:].lower() not in formats:

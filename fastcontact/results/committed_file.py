@@ -81,13 +81,14 @@ class CommittedFile(DriverFile):
         return min(int.from_bytes(head[40:48], "little"), size) if supported else size
 
     def _read_head(self) -> bytes:
+        """Return the first 48 bytes of the file, which contain the end of its contents."""
         self._file.seek(0)
         return self._file.read(48)
 
     def is_intact(self) -> bool:
         """Return whether no other program has changed the superblock, which each flush changes, or truncated the file."""
-        truncated = os.fstat(self.fileno()).st_size < self._ends[-1]
-        self.exclusive = self.exclusive and not truncated and self._read_head() == self._head
+        is_truncated = os.fstat(self.fileno()).st_size < self._ends[-1]
+        self.exclusive = self.exclusive and not is_truncated and self._read_head() == self._head
         return self.exclusive
 
     @property

@@ -21,7 +21,7 @@ The second group contains the data that VTKHDF does not support:
 
 A new nodal array requires an attribute of `step.StepResult`, its value in `analysis.load_step`, its name in
 POINT_FIELDS, a check in `check_step`, and code in `reader`. A new array of contact pairs requires an attribute of
-`step.ContactResult`, its value in `analysis.contact_result`, and a column in `contact_row` or `contact_step`. To be
+`step.ContactResult`, its value in `analysis.contact_result`, and a column in `contact_row` or `contact_step_row`. To be
 shown on the mesh, it also needs its names in POINT_FIELDS and CONTACT_FIELDS.
 """
 
@@ -160,7 +160,7 @@ def primary_row(dim: int) -> np.dtype[Any]:
     return np.dtype([("points", "<i4"), ("force_vectors", "<f8", (dim,))])
 
 
-def contact_step(dim: int) -> np.dtype[Any]:
+def contact_step_row(dim: int) -> np.dtype[Any]:
     """Return the data type of the row of a contact pair at a step.
 
     The row contains the ROW_COLUMNS, which locate the rows of its nodes, and attributes of `step.ContactResult`, with NaN for

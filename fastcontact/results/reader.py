@@ -146,12 +146,12 @@ class Results(StepSequence):
         Error that stopped the run; empty if there was no error or it could not be written.
     """
 
-    def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
+    def __init__(self, path: PathLike, *, always_apply_journal: bool = False) -> None:
         """Open the file.
 
         Changes in the journal, which a power loss may have interrupted, are applied to the data that are read, but not
-        to the file. They are ignored while another program writes to the file, unless `repeat` is true: the caller then
-        guarantees that no other program writes to it, and they are always applied.
+        to the file. They are ignored while another program writes to the file, unless `always_apply_journal` is true: the
+        caller then guarantees that no other program writes to it, and they are always applied.
         """
         import h5py
 
@@ -164,7 +164,7 @@ class Results(StepSequence):
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
-            writes = journal.pending(self._raw) if not is_being_written(self.path) or repeat else []
+            writes = journal.pending(self._raw) if always_apply_journal or not is_being_written(self.path) else []
             if writes:
                 self._raw = journal.JournalView(self._raw, writes)
             with self._as_file_errors():
@@ -348,14 +348,14 @@ class Results(StepSequence):
             return StepResult(
                 index=int(self._rows["index"][number]),
                 load_factor=float(self._rows["load_factor"][number]),
-                contact=self._contact(number, dict(notes["contact"])),
+                contact=self._read_contacts(number, dict(notes["contact"])),
                 iterations=notes["iterations"],
                 warnings=tuple(notes["warnings"]),
-                cell_fields=self._cell_fields(number),
+                cell_fields=self._read_cell_fields(number),
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
                 material_stress=self._material_stress(number),
                 units=self.units,
-                **{k: self._field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in stored},
+                **{k: self._read_field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in stored},
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
@@ -379,7 +379,7 @@ class Results(StepSequence):
         steps, cells = group["materials/steps"][number : number + 1], group["materials/cells"][()]
         if not len(steps) or not steps["count"][0]:
             return None
-        rows = _rows(group["materials/rows"], steps[0], "", "the table of stresses by material")
+        rows = _rows_of_step(group["materials/rows"], steps[0], "", "the table of stresses by material")
         if len(cells) != len(self._file["VTKHDF/Types"]):
             raise ValueError("the table of stresses by material is truncated")
         if rows["points"].min() < 0 or rows["points"].max() >= self.mesh.n_points:
@@ -398,7 +398,7 @@ class Results(StepSequence):
         others = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in others]
 
-    def _cell_fields(self, number: int) -> dict[str, Array]:
+    def _read_cell_fields(self, number: int) -> dict[str, Array]:
         data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
         fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
         for name, values in fields.items():
@@ -406,7 +406,7 @@ class Results(StepSequence):
                 raise ValueError(f"{name} of step {number} is truncated, or has the wrong shape or type")
         return fields
 
-    def _field(self, name: str, number: int, shape: tuple[int, ...]) -> Array:
+    def _read_field(self, name: str, number: int, shape: tuple[int, ...]) -> Array:
         n = self.mesh.n_points
         rows = slice(number * n, (number + 1) * n)
         values = self._file["VTKHDF/PointData"][name][(rows, *map(slice, shape[1:]))]
@@ -414,7 +414,7 @@ class Results(StepSequence):
             raise ValueError(f"{name} of step {number} is truncated, or has the wrong shape or type")
         return values
 
-    def _contact(self, number: int, formulations: Mapping[str, str]) -> dict[str, ContactResult]:
+    def _read_contacts(self, number: int, formulations: Mapping[str, str]) -> dict[str, ContactResult]:
         pairs = {_read_json(pair["name"], self._raw): pair for pair in self._file["fastcontact/contact"].values()}
         contacts = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
         for name, contact in contacts.items():
@@ -465,7 +465,7 @@ def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
     return dict(zip(names, members))
 
 
-def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
+def _rows_of_step(table: Any, step: Any, prefix: str, name: str) -> Any:
     """Return the rows of the table called `name` that belong to a step. Raises ValueError if rows are missing.
 
     The columns ``first`` and ``count`` of the row `step`, whose names begin with `prefix`, contain the index of the first row
@@ -480,7 +480,7 @@ def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
 
 def _read_contact(pair: Any, number: int, name: str, formulation: str) -> ContactResult:
     step = pair["steps"][number]
-    rows = _rows(pair["rows"], step, "", f"the contact table of '{name}'")
+    rows = _rows_of_step(pair["rows"], step, "", f"the contact table of '{name}'")
     columns: dict[str, Any] = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
     for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
@@ -494,7 +494,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     resultants["radius"] = tuple(step["radius"].tolist())
     primary_forces: dict[str, Any] = {}
     if "primary_first" in step.dtype.names:
-        table = _rows(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")
+        table = _rows_of_step(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")
         primary_forces = {f"primary_{key}": np.ascontiguousarray(table[key]) for key in ("points", "force_vectors")}
     return ContactResult(name=name, formulation=formulation, **resultants, **primary_forces, **columns)
 

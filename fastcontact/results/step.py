@@ -57,7 +57,7 @@ class MaterialStress:
         return {int(self.material[row]): self.stress[row] for row in np.flatnonzero(self.points == point)}
 
 
-def by_largest_von_mises(
+def nodal_stress_of_materials(
     sides: MaterialSides, cells: Numbers, separated: Array, n_points: int
 ) -> tuple[Array, MaterialStress]:
     """Return the nodal stress (n_points, n_components) [pressure] and the stress of each material at interfaces.
@@ -612,7 +612,7 @@ class StepResult(NameSuggestions):
 MAX_SHOWN = 30
 
 
-class _Steps(NameSuggestions):
+class _StepList(NameSuggestions):
     """Base class of lists of steps, whose AttributeError states that an attribute belongs to each step."""
 
     if not TYPE_CHECKING:
@@ -624,7 +624,7 @@ class _Steps(NameSuggestions):
             return super().__getattr__(name)
 
 
-class StepSequence(_Steps, Sequence[StepResult]):
+class StepSequence(_StepList, Sequence[StepResult]):
     """A sequence of steps, each of which is read or computed on access."""
 
     @abstractmethod
@@ -644,7 +644,7 @@ class StepSequence(_Steps, Sequence[StepResult]):
         return range(len(self))[number]
 
 
-class Steps(_Steps, list[StepResult]):
+class Steps(_StepList, list[StepResult]):
     """A list of `StepResult`, which notebooks display as a table."""
 
     @overload
@@ -663,7 +663,7 @@ class Steps(_Steps, list[StepResult]):
 
     def _repr_html_(self) -> str:
         """Return an HTML table with a row for each contact pair of each step."""
-        rows = [row for step in self[-MAX_SHOWN:] for row in rows_of(step)]
+        rows = [row for step in self[-MAX_SHOWN:] for row in table_rows(step)]
         omitted = f", {len(self) - MAX_SHOWN} of them not shown" if len(self) > MAX_SHOWN else ""
         return html_table(rows, HEAD, f"{len(self)} steps{omitted}")
 
@@ -671,7 +671,7 @@ class Steps(_Steps, list[StepResult]):
 HEAD = ("step", "load factor", "geometry updates", "contact", "force", "largest pressure", "closed", "contact radius")
 
 
-def rows_of(step: StepResult) -> list[tuple[str, ...]]:
+def table_rows(step: StepResult) -> list[tuple[str, ...]]:
     """Return a row of strings with the columns `HEAD` for each contact pair of a step, or one row if there are no pairs."""
     leading = (str(step.index), f"{step.load_factor:.6g}", str(step.iterations.get("geometry_updates", "")))
     pairs = [(name, *contact.shown.values()) for name, contact in step.contact.items()]

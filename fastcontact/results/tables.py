@@ -78,10 +78,10 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         "gap": contact.gap,
         "pressure": contact.pressure,
         "multiplier": contact.multiplier,
-        **_by_axis("force_", contact.force_vectors),
-        **_by_axis("shear_", contact.shear),
-        **_by_axis("slip_", contact.slip),
-        **_by_axis("slip_total_", contact.slip_total),
+        **_components("force_", contact.force_vectors),
+        **_components("shear_", contact.shear),
+        **_components("slip_", contact.slip),
+        **_components("slip_total_", contact.slip_total),
         **{name: values for name in layout.OPTIONAL_COLUMNS if (values := getattr(contact, name)) is not None},
         "active": contact.active,
         "sticking": contact.sticking,
@@ -267,19 +267,19 @@ def _columns(table: AnyArray) -> Columns:
     return {name: table[name] for name in table.dtype.names}
 
 
-def _by_axis(prefix: str, vectors: AnyArray) -> Columns:
+def _components(prefix: str, vectors: AnyArray) -> Columns:
     return {f"{prefix}{axis}": vectors[:, i] for i, axis in enumerate(AXES[: vectors.shape[1]])}
 
 
 def _positions(points: AnyArray, coordinates: AnyArray, abscissa: AnyArray) -> Columns:
-    return {"point": points, **_by_axis("", coordinates), "abscissa": abscissa}
+    return {"point": points, **_components("", coordinates), "abscissa": abscissa}
 
 
 def _fields(step: StepResult, points: AnyArray) -> Columns:
     """Return the columns of displacement, stress and von Mises stress at `points` (m,)."""
     stress = step.stress[points]
     return {
-        **_by_axis("displacement_", step.displacement[points]),
+        **_components("displacement_", step.displacement[points]),
         **{f"stress_{name}": stress[:, i] for i, name in enumerate(STRESS_COMPONENTS[: stress.shape[1]])},
         "von_mises": step.von_mises[points],
         "von_mises_signed": step.von_mises_signed[points],
@@ -293,7 +293,7 @@ if TYPE_CHECKING:
 STEP_COLUMNS = ("step", "load_factor", "contact")
 
 
-def library(name: str, title: str, install: str) -> Any:
+def import_library(name: str, title: str, install: str) -> Any:
     """Import a library. Raises FileError with the installation command if the library is missing."""
     try:
         return importlib.import_module(name)
@@ -302,7 +302,7 @@ def library(name: str, title: str, install: str) -> Any:
 
 
 def _pyvista() -> Any:
-    return library("pyvista", "PyVista", "'fastcontact[view]'")
+    return import_library("pyvista", "PyVista", "'fastcontact[view]'")
 
 
 def grid(mesh: Mesh, step: StepResult) -> Any:
@@ -333,7 +333,7 @@ def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
 
 def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | None = None) -> pandas.DataFrame:
     """Return a table as a ``pandas.DataFrame``; its ``attrs["units"]`` contains the known units by column."""
-    frame = library("pandas", "pandas", "'fastcontact[table]'").DataFrame(table, columns=columns)
+    frame = import_library("pandas", "pandas", "'fastcontact[table]'").DataFrame(table, columns=columns)
     if known := {name: text for name, text in units.items() if text}:
         frame.attrs["units"] = known
     return cast("pandas.DataFrame", frame)
@@ -341,7 +341,7 @@ def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | No
 
 def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pandas.DataFrame:
     """Return the contact tables of all steps as one ``pandas.DataFrame``, in which the `STEP_COLUMNS` come first."""
-    concat = library("pandas", "pandas", "'fastcontact[table]'").concat
+    concat = import_library("pandas", "pandas", "'fastcontact[table]'").concat
     frames = []
     for step in steps:
         for name, contact in step.contact.items():
@@ -356,7 +356,7 @@ def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pand
 
 def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
     """Return an ``xarray.Dataset`` of steps with the dimensions step, point, axis, stress_component and contact."""
-    xarray, all_steps, dim = library("xarray", "xarray", "xarray"), list(steps), mesh.dim
+    xarray, all_steps, dim = import_library("xarray", "xarray", "xarray"), list(steps), mesh.dim
     pairs = list(dict.fromkeys(name for step in all_steps for name in step.contact))
     components = list(STRESS_COMPONENTS[: 4 if dim == 2 else 6])
 

@@ -25,13 +25,13 @@ MAX_SHARED = 4096
 
 
 def write_geometry(
-    file: Any, mesh: Mesh, growing: Sequence[str] = (), material: AnyArray | None = None, optional: Sequence[str] = ()
+    file: Any, mesh: Mesh, varying: Sequence[str] = (), material: AnyArray | None = None, optional: Sequence[str] = ()
 ) -> None:
     """Write the group /VTKHDF with the solid cells, the constant arrays and empty tables for the steps.
 
-    `growing` contains the names of the cell fields of steps, and `optional` the names of the `layout.OPTIONAL_FIELDS`
-    that steps have. `material` (n_solids,) contains the material number of each cell, if the model has material
-    interfaces. The steps of such a model also have the `layout.MATERIAL_FIELDS`.
+    `varying` contains the names of the cell fields that vary from step to step, and `optional` those of the
+    `layout.OPTIONAL_FIELDS` that steps have. `material` (n_solids,) contains the material number of each cell, if the model
+    has material interfaces. The steps of such a model also have the `layout.MATERIAL_FIELDS`.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
@@ -53,7 +53,7 @@ def write_geometry(
         _write_constant(point_data, name, values)
     for name, values in cell_fields.items():
         _write_constant(cell_data, name, values)
-    widths = dict.fromkeys(growing, 1)
+    widths = dict.fromkeys(varying, 1)
     if material is not None:
         _write_constant(cell_data, "material", material)
         cell_fields = {**cell_fields, "material": material}
@@ -64,9 +64,13 @@ def write_geometry(
 
 
 def _write_steps_group(
-    root: Any, point: Iterable[str], static_point: Iterable[str], static_cell: Iterable[str], growing: Iterable[str]
+    root: Any, point: Iterable[str], static_point: Iterable[str], static_cell: Iterable[str], cell: Iterable[str]
 ) -> None:
-    """Write the empty tables of steps. Tables with equal contents are stored as one data set with several names."""
+    """Write the empty tables of steps. Tables with equal contents are stored as one data set with several names.
+
+    `point` and `cell` contain the names of the point and cell data of each step, `static_point` and `static_cell` those of
+    the arrays that are the same in all steps.
+    """
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = np.int64(0)
     growing_table(steps, "Values", np.float64)
@@ -83,7 +87,7 @@ def _write_steps_group(
         point_offsets[name] = zeros
     for name in static_cell:
         cell_offsets[name] = zeros
-    for name in growing:
+    for name in cell:
         growing_table(cell_offsets, name, np.int64)
 
 
@@ -156,10 +160,11 @@ def growing_table(parent: Any, name: str, dtype: Any, width: int = 0, rows: int 
 
 def as_json(value: Any) -> str:
     """Return `value` as JSON in ASCII; arrays become lists, and NaN is written as NaN."""
-    return json.dumps(value, default=_plain)
+    return json.dumps(value, default=_json_default)
 
 
-def _plain(value: Any) -> Any:
+def _json_default(value: Any) -> Any:
+    """Return NumPy numbers and arrays as numbers and lists, and all other objects as strings."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     return str(value)
@@ -247,7 +252,7 @@ def _new_pair(parent: Any, name: str, dim: int, optional: Iterable[str]) -> dict
     pair["name"] = as_json(name)
     growing_table(pair, "rows", layout.contact_row(dim, optional))
     growing_table(pair, "primary", layout.primary_row(dim))
-    growing_table(pair, "steps", layout.contact_step(dim))
+    growing_table(pair, "steps", layout.contact_step_row(dim))
     parent[str(len(parent))] = pair
     return dict(pair)
 

@@ -396,7 +396,7 @@ def _steps_to_resume(
     if not path.exists() or not path.stat().st_size:
         return [], False, ""
     with contextlib.ExitStack() as closing:
-        old = closing.enter_context(Results(path, repeat=True))
+        old = closing.enter_context(Results(path, always_apply_journal=True))
         if not len(old):
             return [], False, ""
         start_anew = "or start anew without resuming, which replaces the file"

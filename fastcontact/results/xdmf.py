@@ -53,30 +53,30 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     n_points, n_cells, n_steps = mesh.n_points, sum(map(len, mesh.solids.values())), len(load_factors)
     shape = [
         f'<Topology TopologyType="Mixed" NumberOfElements="{n_cells}">',
-        _data(f"{reference}:/fastcontact/mesh/xdmf_topology", (len(topology),), "Int", 4),
+        _data_item(f"{reference}:/fastcontact/mesh/xdmf_topology", (len(topology),), "Int", 4),
         '</Topology><Geometry GeometryType="XYZ">',
-        _data(f"{reference}:/VTKHDF/Points", (n_points, 3)),
+        _data_item(f"{reference}:/VTKHDF/Points", (n_points, 3)),
         "</Geometry>",
     ]
-    constant = [*_constant(reference, "Node", "PointData", layout.point_flags(mesh))]
-    constant += _constant(reference, "Cell", "CellData", layout.cell_fields(mesh))
+    constant = [*_constant_attributes(reference, "Node", "PointData", layout.point_flags(mesh))]
+    constant += _constant_attributes(reference, "Cell", "CellData", layout.cell_fields(mesh))
     grids = []
     for number, load_factor in enumerate(load_factors):
         grids += [f'<Grid Name="step {number + 1}" GridType="Uniform"><Time Value="{load_factor!r}"/>', *shape]
         for field in fields:
-            grids += _field(f"{reference}:/VTKHDF/PointData/{field}", n_points, number, n_steps)
+            grids += _field_attributes(f"{reference}:/VTKHDF/PointData/{field}", n_points, number, n_steps)
         grids += [*constant, "</Grid>"]
     with replacing(target) as temporary:
         temporary.write_text("\n".join([HEAD, *grids, TAIL]), encoding="utf-8")
 
 
-def _words(numbers: Iterable[int]) -> str:
+def _joined(numbers: Iterable[int]) -> str:
     return " ".join(map(str, numbers))
 
 
-def _data(address: str, shape: Iterable[int], kind: str = "Float", precision: int = 8) -> str:
+def _data_item(address: str, shape: Iterable[int], kind: str = "Float", precision: int = 8) -> str:
     """Return an XDMF item that refers to the data set at `address`."""
-    attributes = f'Dimensions="{_words(shape)}" NumberType="{kind}" Precision="{precision}"'
+    attributes = f'Dimensions="{_joined(shape)}" NumberType="{kind}" Precision="{precision}"'
     return f'<DataItem Format="HDF" {attributes}>{escape(address)}</DataItem>'
 
 
@@ -84,14 +84,14 @@ def _attribute(name: str, kind: str, center: str, item: str) -> str:
     return f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">{item}</Attribute>'
 
 
-def _constant(reference: str, center: str, group: str, arrays: Mapping[str, AnyArray]) -> Iterator[str]:
+def _constant_attributes(reference: str, center: str, group: str, arrays: Mapping[str, AnyArray]) -> Iterator[str]:
     """Yield the attributes of arrays that do not change from step to step."""
     for name, values in arrays.items():
         address, kind = f"{reference}:/VTKHDF/{group}/{name}", "Char" if values.itemsize == 1 else "Int"
-        yield _attribute(name, "Scalar", center, _data(address, values.shape, kind, values.itemsize))
+        yield _attribute(name, "Scalar", center, _data_item(address, values.shape, kind, values.itemsize))
 
 
-def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[str]:
+def _field_attributes(address: str, n_points: int, number: int, n_steps: int) -> Iterator[str]:
     """Yield the attributes of a point field in one step, which occupies a part of the data set for all steps."""
     name = address.rpartition("/")[2]
     width = layout.POINT_FIELDS[name]
@@ -101,8 +101,8 @@ def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[s
     dims = 1 if width == 1 else 2
     for label, column, count in columns:
         start, size = (number * n_points, column)[:dims], (n_points, count)[:dims]
-        selection = f'<DataItem Format="XML" Dimensions="3 {dims}">{_words((*start, *[1] * dims, *size))}</DataItem>'
-        whole = _data(address, (n_points * n_steps, width)[:dims])
-        slab = f'ItemType="HyperSlab" Dimensions="{_words(size)}" Type="HyperSlab"'
+        selection = f'<DataItem Format="XML" Dimensions="3 {dims}">{_joined((*start, *[1] * dims, *size))}</DataItem>'
+        whole = _data_item(address, (n_points * n_steps, width)[:dims])
+        slab = f'ItemType="HyperSlab" Dimensions="{_joined(size)}" Type="HyperSlab"'
         item = f"<DataItem {slab}>{selection}{whole}</DataItem>"
         yield _attribute(label, "Vector" if count == 3 else "Scalar", "Node", item)

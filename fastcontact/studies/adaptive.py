@@ -29,8 +29,8 @@ from fastcontact.studies import quantities
 from fastcontact.studies.error_norms import ErrorEstimate, estimate_error
 from fastcontact.studies.job import case_data, last_step
 from fastcontact.studies.quantities import column, title, unit
-from fastcontact.studies.report import Report, Rows, frame, number, panels, report_fields, rows_from_columns
-from fastcontact.studies.settings import Combination, Settings, make_mesh, one_combination, recipe, settings
+from fastcontact.studies.report import Report, Rows, format_axes, number, panels, report_fields, to_rows
+from fastcontact.studies.settings import Combination, Settings, make_mesh, matching_combination, recipe, settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +188,7 @@ class AdaptiveStudy(Report):
             (column(q, q, self.units), [number(round_.values[q], 8) for round_ in self.rounds]),
         ]
         columns += [(label, [number(v, 2) for v in errors[name]]) for label, name in headers.items()]
-        return [(self.combination, rows_from_columns(columns))]
+        return [(self.combination, to_rows(columns))]
 
     def sentences(self) -> list[str]:
         """See `Report`."""
@@ -214,7 +214,7 @@ class AdaptiveStudy(Report):
                 ax.plot(n_dofs, errors[name], style, ms=4, lw=1.0, label=label)
         ax.axhline(self.tolerance, color="black", ls="--", lw=1.0, label="requested")
         labels = ("degrees of freedom", "relative error [-]")
-        frame(ax, f"Error of the {title(self.quantity)}", labels, scales=("plain log", "log"))
+        format_axes(ax, f"Error of the {title(self.quantity)}", labels, scales=("plain log", "log"))
 
     def _draw_mesh(self, ax: Any) -> None:
         """Draw the last mesh with its cells coloured by their error."""
@@ -231,7 +231,7 @@ class AdaptiveStudy(Report):
         bar = ax.figure.colorbar(polygons, ax=ax)
         bar.set_label("energy norm" + (f" [({work})$^{{1/2}}$]" if (work := self.units.get("moment")) else ""))
         labels = axis_label("x", self.units, "length"), axis_label("y", self.units, "length")
-        frame(ax, f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error", labels, grid=0.0)
+        format_axes(ax, f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error", labels, grid=0.0)
 
 
 # Fraction of the sum of the error indicators that the refined cells carry (Dörfler, 1996). With a larger fraction there are
@@ -306,15 +306,15 @@ def adaptive_study(
         raise CaseError("adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D")
     setup = settings(case)
     quantities.check_names(case, [quantity, *setup.quantities])
-    combination = one_combination(setup, element, formulation)
-    forest, curves = _first_mesh(case, setup, combination)
+    combination = matching_combination(setup, element, formulation)
+    forest, curves = _first_forest(case, setup, combination)
     rounds: list[Round] = []
     with StatusLine(80, progress) as line:
         while True:
             started = time.perf_counter()
             linear, leaf = forest.mesh()
-            solved = _case_on(linear, curves, case, setup, combination)
-            last, error = _solve_round(solved, quantity, setup.pair, rounds, started)
+            round_case = _case_on_mesh(linear, curves, case, setup, combination)
+            last, error = _solve_round(round_case, quantity, setup.pair, rounds, started)
             round_ = rounds[-1]
             if on_round is not None:
                 on_round(round_)
@@ -322,13 +322,14 @@ def adaptive_study(
             reached = round_.estimate <= tolerance
             if reached or len(rounds) == max_rounds or round_.n_dofs > 0.6 * max_dofs:
                 break
-            forest.refine(_refined_leaves(_indicator(solved, last, error, quantity, setup.pair), leaf, forest.n_leaves))
+            indicator = _indicator(round_case, last, error, quantity, setup.pair)
+            forest.refine(_refined_leaves(indicator, leaf, forest.n_leaves))
     return AdaptiveStudy(
         **report_fields(case), combination=str(combination), quantity=quantity, tolerance=tolerance, reached=reached,
-        rounds=rounds, case=solved, last=last, error=error)  # fmt: skip
+        rounds=rounds, case=round_case, last=last, error=error)  # fmt: skip
 
 
-def _first_mesh(case: Case, setup: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
+def _first_forest(case: Case, setup: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
     """Return the first mesh as a forest of linear cells, which can be refined, and the curves of its boundary."""
     mesh = case.mesh
     if setup.by_shape and combination.element is not None:
@@ -337,7 +338,7 @@ def _first_mesh(case: Case, setup: Settings, combination: Combination) -> tuple[
     return Forest(linearised(mesh), curves), curves
 
 
-def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, setup: Settings, combination: Combination) -> Case:
+def _case_on_mesh(linear: Mesh, curves: Sequence[Any], case: Case, setup: Settings, combination: Combination) -> Case:
     """Return the case on another mesh with the cells of `linear`, which become quadratic if the element type requires it."""
     element = combination.element
     quadratic = element is not None and elements.get(element).order == 2
@@ -386,7 +387,8 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
     solution, which is the solution under a load that corresponds to the functional (Becker and Rannacher, 2001). For a
     force the dual solution is proportional to the solution itself.
     For a value at a point the dual stress decreases with the distance d like the stress of a point force, as d^(1 - dim)
-    with dim = 3 also in axisymmetry (Boussinesq, 1885; Flamant, 1892). Its error in a cell of size h decreases as h d^-dim.
+    with dim = 3 also in axisymmetry (Boussinesq, 1885; Flamant, 1892). Its error in a cell of size h decreases as h d^-dim,
+    and the norm of this error over the cell is the product with the square root of the volume.
     """
     position = _position(case, last, quantity, pair)
     if position is None:

@@ -10,8 +10,10 @@ from typing import Any
 from fastcontact.errors import CaseError, unknown
 from fastcontact.model.pair_options import SHARED_OPTIONS
 
-_PART = re.compile(r"([^.\[\]]+)((?:\[\d{1,9}\])*)$")
+# A part of a path: a key and the indices that follow it in brackets.
+_PATH_PART = re.compile(r"([^.\[\]]+)((?:\[\d{1,9}\])*)$")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+# A law "a*value^p", whose groups are the numbers a and p.
 _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*$")
 
 
@@ -70,7 +72,7 @@ def _keys(path: str) -> list[str | int]:
     """Return the keys of tables and the indices of lists in a path; CaseError if it is not a path."""
     keys: list[str | int] = []
     for key in path.split("."):
-        match = _PART.match(key)
+        match = _PATH_PART.match(key)
         if match is None:
             raise CaseError(f"'{path}' is not a path in a case file: write for example support[1].y")
         keys.append(match[1])

@@ -17,7 +17,7 @@ from fastcontact.cases.summary import finite_or_none
 from fastcontact.results.units import axis_label
 from fastcontact.studies.fit import CONFIDENCE, Limit
 from fastcontact.studies.quantities import RATIOS, column, title
-from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
+from fastcontact.studies.report import Report, Rows, format_axes, marker, message, number, panels, percent, to_rows
 from fastcontact.studies.series import Series, Split
 
 # Quantities that the report discusses in sentences, in this order.
@@ -143,12 +143,12 @@ def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
         orders = [f"{order:.2f}" if math.isfinite(order) else "-" for order in series.orders(name)]
         columns.append((column(name, name, units), [number(value, 8) for value in series.values(name)]))
         columns += [("error", _errors(series, name)), ("order", orders)]
-    return rows_from_columns(columns)
+    return to_rows(columns)
 
 
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each quantity with a limit: limit, order, theory and errors."""
-    cells = [[column(title(name), name, units), *_cells(series, name, LIMIT_COLUMNS)] for name in series.limits]
+    cells = [[column(title(name), name, units), *_limit_entries(series, name, LIMIT_COLUMNS)] for name in series.limits]
     nonempty = [any(row[index] != "-" for row in cells) for index in range(len(LIMIT_COLUMNS) + 1)]
     return [list(itertools.compress(row, nonempty)) for row in (["quantity", *LIMIT_COLUMNS], *cells)]
 
@@ -163,12 +163,12 @@ def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], uni
     rows = []
     for series in all_series:
         rows.append([str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)])
-        rows[-1] += [text for name in quantities for text in _cells(series, name, columns)]
-        rows[-1] += _cells(series, "pressure_max", ["at equal force"] * len(at_force))
+        rows[-1] += [text for name in quantities for text in _limit_entries(series, name, columns)]
+        rows[-1] += _limit_entries(series, "pressure_max", ["at equal force"] * len(at_force))
     return [header + at_force, *rows]
 
 
-def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
+def _limit_entries(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
     """Return the entries of some columns of limits for a quantity; dashes if it has no limit."""
     limit, split = series.limits.get(quantity), series.split(quantity)
     if limit is None:
@@ -277,7 +277,7 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     _slope_triangles(ax, quantity, [series for _, series in fitted])
     mesh_size = "mesh size h" if all_series[0].combination.function else "facet length at the contact h"
     labels, size = (axis_label(mesh_size, units, "length"), "|value - limit| / limit"), 8 if has_bars else 6.5
-    frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
+    format_axes(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
     if has_bars:  # Matplotlib ignores error bars when it places the legend
         low, high = ax.get_ylim()
@@ -321,7 +321,7 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
     _draw_theory(ax, theory, series, np.linspace(low, reach, 600))
     x_label = axis_label("distance from the middle of the contact", units, "length")
     labels = x_label, axis_label("contact pressure", units, "pressure")
-    frame(ax, f"Contact pressure, {series.combination}", labels, grid=0.3)
+    format_axes(ax, f"Contact pressure, {series.combination}", labels, grid=0.3)
     ax.set_xlim(low, reach or None)
     top = float(ax.dataLim.y1)
     ax.set_ylim(0.0, 1.08 * top if 0.0 < top < np.inf else None)
@@ -362,7 +362,7 @@ def draw_differences(ax: Any, all_series: Sequence[Series], best: Series, units:
     ax.axhline(0.0, color="black", lw=1.0, label="theory")
     y_label = "difference from theory [%]" if best.exact_theory else f"difference from theory {best.compared} [%]"
     labels = axis_label("facet length at the contact h", units, "length"), y_label
-    frame(ax, f"Model and mesh error of the {title(quantity)}", labels, scales=("plain log", "linear"))
+    format_axes(ax, f"Model and mesh error of the {title(quantity)}", labels, scales=("plain log", "linear"))
 
 
 # Standard quantities in figures and in the table of all combinations.

@@ -198,7 +198,7 @@ def _stress_in_cells(
 def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, cell_arrays: CellArrays) -> Array:
     """Return the squares (4,) of the norms over some cells, in the order of the attributes of `ErrorNorms`."""
     N, stress, volume, elastic = cell_arrays
-    exact_u, exact_stress = _exact(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
+    exact_u, exact_stress = _exact_fields(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
         elastic_energy(stress - exact_stress, elastic), (error_u**2).sum(axis=-1),
@@ -207,10 +207,10 @@ def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, cell
     return np.array([(density * volume).sum() for density in densities])
 
 
-def _exact(theory: Theory, positions: Array, n_components: int) -> tuple[Array, Array]:
+def _exact_fields(theory: Theory, positions: Array, n_components: int) -> tuple[Array, Array]:
     """Return displacements and stresses (n_cells, n_q, ...) of a theory at `positions` (n_cells, n_q, dim) [length]."""
     points = positions.reshape(-1, positions.shape[2])
-    at_points = []
+    fields = []
     for name, size in (("displacement", points.shape[1]), ("stress", n_components)):
         values = np.asarray(getattr(theory, name)(points), float)
         if values.shape != (len(points), size):
@@ -218,8 +218,8 @@ def _exact(theory: Theory, positions: Array, n_components: int) -> tuple[Array, 
         if not np.isfinite(values).all():
             first = points[np.flatnonzero(~np.isfinite(values).all(axis=1))[0]]
             raise ModelError(f"the theory's {name} is not finite at {first}")
-        at_points.append(values.reshape(*positions.shape[:2], size))
-    return at_points[0], at_points[1]
+        fields.append(values.reshape(*positions.shape[:2], size))
+    return fields[0], fields[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +256,10 @@ class ErrorEstimate:
 
     @property
     def relative(self) -> float:
-        """Estimated error of the solution divided by the energy norm of the solution [-]."""
+        """Estimated error of the solution divided by the estimated energy norm of the exact solution [-].
+
+        The latter is ``sqrt(energy**2 + total**2)`` (Zienkiewicz and Zhu, 1987).
+        """
         return self.total / math.hypot(self.energy, self.total) if self.total else 0.0
 
 
@@ -308,11 +311,14 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 
 
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:
-    """Add h / E times the squared difference between pressure and smoothed normal stress to `contact` (n_solids,)."""
+    """Add h / E times the integral of the squared traction jump over each secondary facet to `contact` (n_solids,).
+
+    The jump is the difference between the pressure and the negative smoothed normal stress, and h is the size of the facet.
+    """
     mesh, outer, cells_of_outer = model.mesh, outer_facets(model.mesh), cells_of_outer_facets(model.mesh)
     pair = next(pair for pair in model.contact if pair.name == result.name)
-    nodal = np.zeros(mesh.n_points)
-    nodal[result.points] = result.pressure
+    nodal_pressure = np.zeros(mesh.n_points)
+    nodal_pressure[result.points] = result.pressure
     starts, sizes = starts_of(mesh.solids), [len(cells) for cells in mesh.cells.values()]
     E, material = np.array([law.young[0] for law, _ in model.materials]), model.material_field().material_numbers
     for block in surface(mesh, pair.secondary).blocks:
@@ -322,15 +328,15 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
         area = facet_measure(block.facets, block.element, mesh.points, xi, model.kinematics == "axisymmetric") * weights
         normals = area_vectors(mesh.points[block.facets], reference.gradient(xi))
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-        number = cells_of_outer[block.element][same_facets(outer[block.element], block.facets)].astype(np.intp)
-        for name, (facet, cell) in zip(mesh.cells, by_block(number, sizes), strict=True):
+        cell_numbers = cells_of_outer[block.element][same_facets(outer[block.element], block.facets)].astype(np.intp)
+        for name, (facet, cell) in zip(mesh.cells, by_block(cell_numbers, sizes), strict=True):
             if not len(facet):
                 continue
             local = np.argmax(mesh.cells[name][cell][:, None] == block.facets[facet][:, :, None], axis=2)
-            at_nodes = smooth[name][cell[:, None], local]
-            tensor = np.einsum("qa,fai->fqi", N, at_nodes)[..., PAIRS[mesh.dim]]
+            nodal_stress = smooth[name][cell[:, None], local]
+            tensor = np.einsum("qa,fai->fqi", N, nodal_stress)[..., PAIRS[mesh.dim]]
             traction = (tensor * normals[facet][..., None, :]).sum(axis=-1)
-            p = nodal[block.facets[facet]] @ N.T
+            p = nodal_pressure[block.facets[facet]] @ N.T
             jump = ((traction + p[:, :, None] * normals[facet]) * normals[facet]).sum(axis=2)
             h = np.linalg.norm(np.ptp(mesh.points[block.facets[facet]], axis=1), axis=1)
             square = h / E[material[name][cell]] * (jump**2 * area[facet]).sum(axis=1)

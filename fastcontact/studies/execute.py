@@ -26,7 +26,7 @@ from fastcontact._tools.paths import replacing
 from fastcontact.analysis.progress import StatusLine
 from fastcontact.errors import CaseError, FastcontactError, FileError
 from fastcontact.results.committed_file import uninterrupted
-from fastcontact.studies.job import QuantityError, Run, run
+from fastcontact.studies.job import QuantityError, Run, execute_run
 
 
 class StudyStatus(StatusLine):
@@ -52,7 +52,7 @@ class StudyStatus(StatusLine):
 
 Result = dict[str, Any]
 # Environment variables that must be set before a worker process starts, because NumPy and Numba read them on import.
-_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Progress:
 
 
 def run_study(
-    jobs: Sequence[Run],
+    runs: Sequence[Run],
     name: str,
     *,
     executor: Executor | None = None,
@@ -96,33 +96,33 @@ def run_study(
     on_progress: Callable[[Progress], None] | None = None,
     progress: bool = False,
 ) -> list[Result]:
-    """Run jobs in parallel and return their results in the order of the jobs; for options see `convergence_study`.
+    """Execute runs in parallel and return their results in the given order; for options see `convergence_study`.
 
     Raises CaseError if the number of workers is invalid or if the function that computes a quantity fails before any run has
     succeeded, and FastcontactError if no worker process can start. If all runs fail, the error of the first one is raised,
     with `name` before its message.
     """
     storage = None if store is None else Store(store)
-    stored = {i: result for i, job in enumerate(jobs) if storage and (result := storage.get(job)) is not None}
-    waiting, results = {index: job.label for index, job in enumerate(jobs)}, dict[int, Result]()
+    stored = {i: result for i, run in enumerate(runs) if storage and (result := storage.get(run)) is not None}
+    waiting, results = {index: run.label for index, run in enumerate(runs)}, dict[int, Result]()
     to_run = [index for index in waiting if index not in stored]
     with StudyStatus(progress) as line:
-        for index, result in itertools.chain(stored.items(), _run_jobs(jobs, to_run, executor, workers)):
+        for index, result in itertools.chain(stored.items(), _results_of(runs, to_run, executor, workers)):
             if storage is not None and "error" not in result and index not in stored:
-                storage.put(jobs[index], result)
+                storage.put(runs[index], result)
             if result.get("kind") == QuantityError.__name__ and all("error" in other for other in results.values()):
-                raise CaseError(f"{jobs[index].label}: {result['error']}")  # it would fail for the other runs as well
+                raise CaseError(f"{runs[index].label}: {result['error']}")  # it would fail for the other runs as well
             results[index], label, left = result, waiting.pop(index), tuple(waiting.values())
             seconds = 0.0 if index in stored else float(result.get("seconds", 0.0))
-            counts, error = (len(results), len(jobs)), str(result.get("error", ""))
+            counts, error = (len(results), len(runs)), str(result.get("error", ""))
             state = Progress(label, *counts, left, seconds, error, stored=index in stored)
             line(state)
             if on_progress is not None:
                 on_progress(state)
     if all("error" in result for result in results.values()):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
-        raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")
-    return [results[index] for index in range(len(jobs))]
+        raise kind(f"{name}; {runs[0].label}: {results[0]['error']}")
+    return [results[index] for index in range(len(runs))]
 
 
 class Store:
@@ -140,46 +140,46 @@ class Store:
                 f"the folder '{folder}' cannot be created: {error.strerror}; choose another folder"
             ) from error
 
-    def path(self, job: Run) -> Path:
+    def path(self, run: Run) -> Path:
         """Return the path of the file for the result of a run."""
-        return self.folder / f"{job.key}.json"
+        return self.folder / f"{run.key}.json"
 
-    def get(self, job: Run) -> Result | None:
-        """Return the result of a run, or None if it is missing or incomplete."""
+    def get(self, run: Run) -> Result | None:
+        """Return the stored result of a run, or None if it is missing or incomplete."""
         try:
-            stored = json.loads(self.path(job).read_text(encoding="utf-8"))
+            stored = json.loads(self.path(run).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
         result = stored.get("result") if isinstance(stored, dict) else None
         return result if isinstance(result, dict) and "values" in result else None
 
-    def put(self, job: Run, result: Result) -> None:
+    def put(self, run: Run, result: Result) -> None:
         """Store the result of a run in a file that is written atomically."""
-        text = json.dumps({"label": job.label, "case": job.name, "marks": job.marks, "result": result}, default=str)
-        with replacing(self.path(job)) as temporary:
+        text = json.dumps({"label": run.label, "case": run.name, "marks": run.marks, "result": result}, default=str)
+        with replacing(self.path(run)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def _run_jobs(
-    jobs: Sequence[Run], indices: list[int], executor: Executor | None, workers: int | None
+def _results_of(
+    runs: Sequence[Run], indices: list[int], executor: Executor | None, workers: int | None
 ) -> Iterator[tuple[int, Result]]:
-    """Run the jobs with the given `indices`. Yields the index and the result of each job when it ends."""
+    """Execute the runs with the given `indices`. Yields the index and the result of each run when it ends."""
     if workers is not None and workers < 1:
         raise CaseError(f"workers = {workers} is not allowed: the number of processes must be at least 1")
     count = min(workers or _processors(), len(indices))
     if executor is not None:
-        yield from run_on_executor(executor, jobs, indices)
+        yield from run_on_executor(executor, runs, indices)
     elif count <= 1:
         for index in indices:
-            yield index, run(jobs[index])
+            yield index, execute_run(runs[index])
     else:
-        yield from run_on_processes(count, jobs, indices)
+        yield from run_on_processes(count, runs, indices)
 
 
-def run_on_processes(count: int, jobs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
-    """Run jobs in `count` local processes; yield the index and the result of each job as it ends.
+def run_on_processes(count: int, runs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
+    """Execute runs in `count` local processes; yield the index and the result of each run as it ends.
 
-    If a worker process dies, each job that has not ended runs again in a separate process.
+    If a worker process dies, each run that has not ended is repeated in a separate process.
     """
     if sys.modules.get("__mp_main__") not in (None, sys.modules["__main__"]):
         # This process is a worker that imports the script of its parent, which calls the study without
@@ -188,12 +188,12 @@ def run_on_processes(count: int, jobs: Sequence[Run], indices: list[int]) -> Ite
     left = list(indices)
     try:
         with process_pool(count) as pool:
-            for index, result in run_on_executor(pool, jobs, indices):
+            for index, result in run_on_executor(pool, runs, indices):
                 left.remove(index)
                 yield index, result
     except BrokenProcessPool:
         for index in left:
-            yield index, _run_alone(jobs[index])
+            yield index, _run_alone(runs[index])
 
 
 class Worker(SpawnProcess):
@@ -223,12 +223,12 @@ class Workers(ProcessPoolExecutor):
 
     def __init__(self, count: int) -> None:
         self.context = RecordingContext()
-        receiver, self.line = self.context.Pipe(duplex=False)
+        receiver, self.pipe = self.context.Pipe(duplex=False)
         super().__init__(count, self.context, initializer=end_with_parent, initargs=(receiver,))
 
     def end(self) -> None:
         """Terminate the processes. Otherwise Python would wait for the end of their current work before it exits."""
-        self.line.close()
+        self.pipe.close()
         for process in self.context.processes:
             if process.is_alive():  # a process that is still importing modules does not read from the pipe
                 process.terminate()
@@ -261,11 +261,11 @@ def process_pool(count: int) -> Iterator[Workers]:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _run_alone(job: Run) -> Result:
-    """Return the result of a job that runs in a separate process, or an error if the process dies."""
+def _run_alone(run: Run) -> Result:
+    """Return the result of a run in a separate process, or an error if the process dies."""
     try:
         with process_pool(1) as pool:
-            return pool.submit(run, job, 1).result()
+            return pool.submit(execute_run, run, 1).result()
     except BrokenProcessPool:
         text = "its worker process was killed, probably because it ran out of memory: use coarser meshes"
         return {"error": text, "kind": "BrokenProcessPool"}
@@ -278,18 +278,18 @@ def _processors() -> int:
     return os.cpu_count() or 1
 
 
-def run_on_executor(executor: Executor, jobs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
-    """Run jobs on any executor; yield the index and the result of each job as it ends.
+def run_on_executor(executor: Executor, runs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
+    """Execute runs on any executor; yield the index and the result of each run as it ends.
 
-    If a job raises an exception, the other jobs are cancelled.
+    If a run raises an exception, the other runs are cancelled.
     """
     futures: dict[Future[Result], int] = {}
     try:
         # Threads share the environment of this process, which must not change while they compile.
         with contextlib.nullcontext() if isinstance(executor, ThreadPoolExecutor) else _worker_settings():
-            # The largest jobs start first, so that no long job runs alone at the end.
-            for index in sorted(indices, key=lambda index: -jobs[index].size):
-                futures[executor.submit(run, jobs[index], 1)] = index
+            # The largest runs start first, so that no long run remains alone at the end.
+            for index in sorted(indices, key=lambda index: -runs[index].size):
+                futures[executor.submit(execute_run, runs[index], 1)] = index
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BaseException as error:
@@ -300,13 +300,13 @@ def run_on_executor(executor: Executor, jobs: Sequence[Run], indices: list[int])
         raise
 
 
-def end_with_parent(line: Connection) -> None:
-    """Let this process end as soon as its parent process ends or closes its end of the pipe `line`."""
+def end_with_parent(pipe: Connection) -> None:
+    """Let this process end as soon as its parent process ends or closes its end of the `pipe`."""
     parent = multiprocessing.parent_process()
 
     def wait() -> None:
         if parent is not None:
-            connection.wait([parent.sentinel, line])
+            connection.wait([parent.sentinel, pipe])
             os._exit(1)
 
     threading.Thread(target=wait, daemon=True).start()
@@ -318,10 +318,10 @@ def _worker_settings() -> Iterator[None]:
 
     A terminal sends Ctrl-C to all processes, and each of them would print a traceback. Only this process handles it.
     """
-    original = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-    masks = hasattr(signal, "pthread_sigmask")
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else None
+    original = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
+    can_block = hasattr(signal, "pthread_sigmask")
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else None
     try:
         yield
     finally:

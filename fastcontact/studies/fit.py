@@ -26,6 +26,7 @@ from fastcontact.errors import CaseError
 from fastcontact.round_off import ROUND_OFF
 
 CONFIDENCE = 0.95
+# Orders over which the results are averaged.
 ORDERS = np.geomspace(0.4, 6.0, 81)
 # Median of the prior of the order, and standard deviation of its logarithm.
 PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35
@@ -142,8 +143,9 @@ def _sorted_finite(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
 def _limit_distributions(x: Array, y: Array, floor: float, coarse: int) -> Array:
     """Return location and scale of the Student distribution of the limit, and the log evidence, for each order (3, n_orders).
 
-    `x` (n,) and `y` (n,) are normalised mesh sizes and values [-], and `floor` is added to the sum of squares. The first
-    `coarse` meshes are assumed to be too coarse for a single power of the mesh size.
+    `x` (n,) and `y` (n,) are normalised mesh sizes and values [-]. `floor`, the square of the round-off of the values, is
+    added to the sum of squares, whose logarithm would otherwise be undefined for values without scatter. The first `coarse`
+    meshes are assumed to be too coarse for a single power of the mesh size.
     """
     result = np.empty((3, len(ORDERS)))
     dof = len(x) - 2 + PRIOR_WEIGHT

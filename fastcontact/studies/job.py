@@ -38,7 +38,7 @@ from fastcontact.studies import quantities
 from fastcontact.studies.settings import Combination, Recipe, Settings, make_mesh, recipe
 
 # Keys of contact pairs and obstacles that are valid for all formulations, in addition to `SHARED_OPTIONS`.
-KEYS = {
+COMMON_KEYS = {
     *("secondary", "primary", "formulation", "friction", "shape", "motion", "force", "rotation", "ramp"),
     *("file", "group", "flip", "crease"),
 }
@@ -68,7 +68,7 @@ class Run:
         raise NotImplementedError
 
     def evaluate(self) -> dict[str, Any]:
-        """Solve the run and return its result, see `run`. Errors of the mesh, the model and the solution are raised."""
+        """Solve the run and return its result, see `execute_run`. Errors of mesh, model and solution are raised."""
         started = time.perf_counter()
         with record_warnings() as texts:
             case, steps = self.solve_run()
@@ -76,7 +76,7 @@ class Run:
         pair = self.pair or next(iter(last.contact), None)
         values = quantities.quantities_of_contacts(last) if case is None else quantities.measure(case, last, pair)
         values = {name: value for name, value in values.items() if np.isfinite(value)}
-        values |= {name: _number(name, measure, steps) for name, measure in self.measures.items()}
+        values |= {name: _measured_value(name, measure, steps) for name, measure in self.measures.items()}
         return {
             "h": math.nan if case is None else quantities.mesh_size(case, pair),
             "n_dofs": last.displacement.size,
@@ -156,7 +156,7 @@ class QuantityError(CaseError):
     """A function of a quantity has failed."""
 
 
-def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
+def _measured_value(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
     """Return the value of a quantity that a function of the caller evaluates; QuantityError if the function fails."""
     try:
         return float(measure(steps if first_parameter(measure) == STEPS_ARGUMENT else steps[-1]))
@@ -186,14 +186,14 @@ def record_warnings() -> Iterator[list[str]]:
     texts += [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
 
 
-def job_of(case: Case, setup: Settings, combination: Combination, level: int, **of_run: Any) -> Job:
+def job_of(case: Case, setup: Settings, combination: Combination, level: int, **fields: Any) -> Job:
     """Return the job of a case with the element and the formulation of `combination` on the mesh of a level.
 
-    `of_run` are the other fields of a `Run`: its label, its marks and its size.
+    `fields` are the other fields of a `Run`: its label, its marks and its size.
     """
     data, mesh = case_data(setup, combination), recipe(setup, combination.element, level)
     base = case.mesh if setup.generator is None else None
-    return Job(name=case.name, data=data, pair=setup.pair, recipe=mesh, base=base, folder=case.folder, **of_run)
+    return Job(name=case.name, data=data, pair=setup.pair, recipe=mesh, base=base, folder=case.folder, **fields)
 
 
 def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
@@ -218,17 +218,17 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     return data
 
 
-def _set_formulation(entry: dict[str, Any], formulation: str, settings: Settings, name: str) -> None:
-    """Set the formulation and its options in the table of a contact pair or an obstacle, whose formulation was `name`."""
-    if formulation != name:
-        valid = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | KEYS | set(SHARED_OPTIONS)
+def _set_formulation(entry: dict[str, Any], formulation: str, settings: Settings, original: str) -> None:
+    """Set the formulation and its options in the table of a contact pair or an obstacle, instead of the `original` one."""
+    if formulation != original:
+        valid = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | COMMON_KEYS | set(SHARED_OPTIONS)
         for key in [key for key in entry if key not in valid]:
             del entry[key]
         entry["formulation"] = formulation
     entry.update(settings.options.get(formulation, {}))
 
 
-def run(job: Run, threads: int | None = None) -> dict[str, Any]:
+def execute_run(run: Run, threads: int | None = None) -> dict[str, Any]:
     """Execute a run and return its result; errors are not raised but returned under the key ``"error"``.
 
     `threads` is the number of threads of the parallel kernels in this process. The result contains ``h`` [length],
@@ -239,7 +239,7 @@ def run(job: Run, threads: int | None = None) -> dict[str, Any]:
     try:
         if threads is not None:
             _jit.set_threads(threads)
-        return job.evaluate()
+        return run.evaluate()
     except FastcontactError as error:
         return {"error": str(error), "kind": type(error).__name__}
     except Exception as error:

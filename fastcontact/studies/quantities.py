@@ -102,7 +102,7 @@ def _contact_quantities(case: Case, contact: ContactResult, pair: str) -> dict[s
     quantities = _pressure_quantities(contact)
     theory: Any = case.theories.get(pair, {}).get("theory")
     if case.mesh.dim == 2 and pressure_curve(theory) is not None:
-        side = secondary(case, pair)
+        side = secondary_surface(case, pair)
         quantities["pressure_error"] = pressure_error(case, side, contact, theory)
         if hasattr(theory, "at_force") and quantities["force"] > 0:
             at_force = theory.at_force(quantities["force"] / case.theories[pair]["share"])
@@ -110,7 +110,7 @@ def _contact_quantities(case: Case, contact: ContactResult, pair: str) -> dict[s
     return {name: value for name, value in quantities.items() if np.isfinite(value)}
 
 
-def secondary(case: Case, pair: str) -> Surface:
+def secondary_surface(case: Case, pair: str) -> Surface:
     """Return the secondary surface of a contact pair."""
     return surface(case.mesh, next(p.secondary for p in case.model.contact if p.name == pair))
 
@@ -173,10 +173,10 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
     on_axis_peak = _peak_on_axis(mesh, values, top) if on_axis else None
     if on_axis_peak is not None:
         return on_axis_peak
-    ring = np.unique(np.concatenate([block[(block == top).any(axis=1)].ravel() for block in mesh.solids.values()]))
-    x = (mesh.points[ring] - mesh.points[top]).T
+    adjacent = np.unique(np.concatenate([block[(block == top).any(axis=1)].ravel() for block in mesh.solids.values()]))
+    x = (mesh.points[adjacent] - mesh.points[top]).T
     size = np.abs(x).max()
-    vertex = _vertex(x / size, values[ring], on_axis) if mesh.dim == 2 and size > 0 else None
+    vertex = _vertex(x / size, values[adjacent], on_axis) if mesh.dim == 2 and size > 0 else None
     if vertex is None:
         return float(values[top]), mesh.points[top].copy()
     return vertex[0], mesh.points[top] + size * vertex[1]
@@ -191,10 +191,10 @@ def _peak_on_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | 
     _, body = bodies(mesh)
     line = line[body[line] == body[top]]
     line = line[np.argsort(mesh.points[line, 1])]
-    low = values[line] < 0.97 * values[top]
+    is_low = values[line] < 0.97 * values[top]
     row = int(np.flatnonzero(line == top)[0])
-    first = int(np.flatnonzero(low[:row])[-1]) + 1 if low[:row].any() else 0
-    last = row + int(np.flatnonzero(low[row:])[0]) if low[row:].any() else len(line)
+    first = int(np.flatnonzero(is_low[:row])[-1]) + 1 if is_low[:row].any() else 0
+    last = row + int(np.flatnonzero(is_low[row:])[0]) if is_low[row:].any() else len(line)
     nodes = line[first:last]
     if len(nodes) < 8 or not first <= row - 2 or not row + 2 < last:
         return None
@@ -245,7 +245,7 @@ def mesh_size(case: Case, pair: str | None) -> float:
     if pair is None:
         return quality(case.mesh).shortest_edge
     shortest = np.inf
-    for block in secondary(case, pair).blocks:
+    for block in secondary_surface(case, pair).blocks:
         facet, points = elements.get(block.element), case.mesh.points[block.facets]
         for a, b in facet.edges if facet.dim == 2 else ((0, 1),):
             shortest = min(shortest, float(np.linalg.norm(points[:, b] - points[:, a], axis=1).min()))

@@ -41,7 +41,7 @@ def percent(value: float | None, uncertainty: float | None = None) -> str:
     return f"{100 * value:+.{4 if uncertainty is not None and 0 < uncertainty < 1e-5 else 3}f} %"
 
 
-def rows_from_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
+def to_rows(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
     """Return the rows of a table from its columns, which are pairs of header and entries; the first row is the header."""
     return [[name for name, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
 
@@ -78,7 +78,7 @@ def message(ax: Any, text: str) -> None:
     ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
 
 
-def frame(
+def format_axes(
     ax: Any,
     title: str,
     labels: tuple[str, str],

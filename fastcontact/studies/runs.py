@@ -36,7 +36,7 @@ from fastcontact.studies.settings import (
     combinations,
     data_of,
     make_mesh,
-    one_combination,
+    matching_combination,
     recipe,
     settings,
 )
@@ -191,10 +191,10 @@ def level_job(case: Case, setup: Settings, combination: Combination, level: int)
     return job_of(case, setup, combination, level, label=f"{combination} level {level}", marks=marks, size=level)
 
 
-def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], further: Sequence[str]) -> Study:
+def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], requested: Sequence[str]) -> Study:
     """Return the study of finished runs.
 
-    The quantities in `further` are fitted in addition to the standard quantities and to those of the checks of probes.
+    The quantities in `requested` are fitted in addition to the standard quantities and to those of the checks of probes.
     """
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
@@ -209,26 +209,26 @@ def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], fu
         if all("error" in result for _, result in runs):
             failed[str(combination)] = str(runs[0][1]["error"])
         else:
-            series.append(_series(combination, runs, further, checked, (theory, share, compared)))
+            series.append(_series(combination, runs, requested, checked, (theory, share, compared)))
     return Study(**report_fields(case), series=series, failed=failed, theory=theory)
 
 
 def _series(
-    combination: Combination, results: list[tuple[int, Result]], further: Sequence[str], checked: Sequence[str],
+    combination: Combination, results: list[tuple[int, Result]], requested: Sequence[str], checked: Sequence[str],
     theory: tuple[Any, float, str], asked: tuple[str, ...] = (),
 ) -> Series:  # fmt: skip
     """Return the series of one element type and formulation with its limits.
 
-    The quantities in `further` must be in the results; those in `checked` are fitted if they are. `theory` consists of the
+    The quantities in `requested` must be in the results; those in `checked` are fitted if they are. `theory` consists of the
     theory of the contact pair, the fraction of the contact that the model represents, and the condition of the comparison
     (see `Series.compared`).
     """
     solved = [(number, result) for number, result in results if "error" not in result]
     levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
     finest = levels[-1].values
-    for name in further:
+    for name in requested:
         check_known("quantity", name, finest, CaseError)
-    names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *further) if name in finest))
+    names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *requested) if name in finest))
     limits = {name: limit for name in names if (limit := _limit(levels, name)) is not None}
     failed = {number: str(result["error"]) for number, result in results if "error" in result}
     at_force, spread = _theory_at_force(*theory[:2], limits.get("force"))
@@ -346,7 +346,7 @@ def parameter_sweep(
     results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
         **report_fields(case),
-        **_points(parameters, choices, results),
+        **_sweep_fields(parameters, choices, results),
         combination=str(jobs[0].marks["combination"]),
         theories=_theory_curves(case, parameters, jobs[0].pair),
         asked=names,
@@ -370,7 +370,7 @@ def _sweep_of_function(
         for choice, call in zip(choices, calls, strict=True)
     ]
     results = run_functions(runs, "no point of the sweep could be solved", **options)
-    points = _points(values, choices, results)
+    points = _sweep_fields(values, choices, results)
     return Sweep(**function_fields(function, results), **points, combination=name, asked=tuple(quantities), compared="")
 
 
@@ -382,7 +382,7 @@ def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]
     return [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
 
 
-def _points(
+def _sweep_fields(
     parameters: Mapping[str, Sequence[Value]], choices: Sequence[dict[str, Value]], results: Sequence[Result]
 ) -> dict[str, Any]:
     """Return the fields of a `Sweep` that describe its parameters and points."""
@@ -427,7 +427,7 @@ def _theory_at(data: dict[str, Any], pair: str | None) -> dict[str, float]:
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
     """Return the job that solves a case for one choice of parameter values."""
     setup = settings(case, substitute(data_of(case), choice))
-    combination = one_combination(setup, element, formulation)
+    combination = matching_combination(setup, element, formulation)
     level = (DEFAULT_LEVEL if setup.by_shape else 0) if level is None else level
     # Runs with the largest meshes start first, according to the number of points on level 0.
     size = make_mesh(recipe(setup, combination.element, 0), None).n_points if setup.generator is not None else 0

@@ -283,8 +283,8 @@ class Point(RunResult):
         float
             Ratio [-]; NaN if one of the values is unknown.
         """
-        other = getattr(self, to).get(quantity)
-        return self.values.get(quantity, math.nan) / other if other else math.nan
+        denominator = getattr(self, to).get(quantity)
+        return self.values.get(quantity, math.nan) / denominator if denominator else math.nan
 
 
 @dataclass(frozen=True, eq=False)

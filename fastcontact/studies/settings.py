@@ -163,7 +163,7 @@ def combinations(
         return settings.combinations
     selected = [settings.case_combination.element] if element_names is None else list(element_names)
     if selected == ["all"]:
-        selected = [name for name in ALL_ELEMENTS if can_make(settings, name)]
+        selected = [name for name in ALL_ELEMENTS if can_mesh(settings, name)]
     if formulations is not None and settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
     compared = [settings.case_combination.formulation] if formulations is None else list(formulations)
@@ -172,7 +172,7 @@ def combinations(
     return tuple(_make_combination(element, formulation) for element in selected for formulation in compared)
 
 
-def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
+def matching_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
     """Return the last combination of ``[study]`` with the given element and formulation, where None matches any.
 
     If there is none, the result is a new combination, in which None is replaced by the value of the last combination.
@@ -185,7 +185,7 @@ def one_combination(settings: Settings, element: str | None, formulation: str | 
     return _make_combination(element or last.element, formulation or last.formulation)
 
 
-def can_make(settings: Settings, element: str) -> bool:
+def can_mesh(settings: Settings, element: str) -> bool:
     """Return whether meshes of an element can be made for the case."""
     if settings.by_shape:
         return shape_of(element) in settings.arguments
@@ -232,7 +232,7 @@ def _round_body_rule(arguments: Mapping[str, Any], coarse: int, fine: int, *furt
     return Rule({"size": size, "contact_size": min(R / fine, size)}, ("size", "contact_size", *further))
 
 
-def _half_space_rule(element: str, arguments: Mapping[str, Any]) -> Rule:
+def _half_space_rule(_: str, arguments: Mapping[str, Any]) -> Rule:
     """Return the rule of a block that represents a half-space."""
     width = float(arguments.get("width", 10.0))
     radius, size = float(arguments.get("contact_radius", width / 10)), float(arguments.get("size", width / 4))
@@ -263,8 +263,8 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
 
     Raises CaseError if meshes of the element cannot be made for the case, or an argument of the generator is unknown.
     """
-    if element is not None and not can_make(settings, element):
-        raise CaseError(_no_meshes(settings, element))
+    if element is not None and not can_mesh(settings, element):
+        raise CaseError(_no_mesh_message(settings, element))
     if settings.generator is None:
         curves = settings.curves and [[list(c.centre), c.radius, c.group] for c in settings.curves]
         return {"refinements": level, "element": element, "curves": curves}
@@ -279,7 +279,7 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
 
 
-def _no_meshes(settings: Settings, element: str) -> str:
+def _no_mesh_message(settings: Settings, element: str) -> str:
     """Return the message that meshes of an element cannot be made for the case, with a remedy."""
     original = settings.case_combination.element or "mixed cells"
     if settings.by_shape:
@@ -327,10 +327,10 @@ def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
         return _refine_repeatedly(mesh, recipe["refinements"], circles(mesh) if recipe["refinements"] else [])
     if base is None:
         raise FastcontactError("the refinement of a mesh needs the initial mesh")
-    return _from_file(recipe, base)
+    return _refined_mesh(recipe, base)
 
 
-def _from_file(recipe: Recipe, base: Mesh) -> Mesh:
+def _refined_mesh(recipe: Recipe, base: Mesh) -> Mesh:
     """Return the refined mesh of a case, with cells of the order of the element in the recipe."""
     entries, element = recipe["curves"], recipe["element"]
     curves = circles(base) if entries is None else [Circle(tuple(c), radius, group) for c, radius, group in entries]

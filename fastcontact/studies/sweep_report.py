@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
+from fastcontact.studies.report import Report, Rows, format_axes, marker, message, number, panels, percent, to_rows
 from fastcontact.studies.series import Point, TheoryCurve, Value
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class Drawing:
                 ax.plot(self._x(points), exact, "_", ms=9, **style)
         positive = all(point.values.get(quantity, 1.0) > 0 for point in self.sweep.points)
         scale = self.scale if positive else "linear"
-        self._frame(ax, title(quantity), column(title(quantity), quantity, self.sweep.units), scale)
+        self._format(ax, title(quantity), column(title(quantity), quantity, self.sweep.units), scale)
 
     def _x(self, points: Sequence[Point]) -> list[Any]:
         """Return the values of the parameter on the x axis, as strings if one of them is a string."""
@@ -120,9 +120,9 @@ class Drawing:
         styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
         n_lines = 0
         for k, (label, points) in enumerate(self.points_of.items()):
-            for other, (style, name) in styles.items():
-                ratios = [point.ratio(quantity, other) for point in points]
-                if np.isfinite(ratios).any() and (other, quantity) != ("equal_force", "force"):
+            for comparison, (style, name) in styles.items():
+                ratios = [point.ratio(quantity, comparison) for point in points]
+                if np.isfinite(ratios).any() and (comparison, quantity) != ("equal_force", "force"):
                     name = f"to {name}" + (f"\n{label}" if label else "")
                     color = f"C{k if self.others else n_lines}"
                     ax.plot(self._x(points), ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
@@ -130,12 +130,12 @@ class Drawing:
         if not n_lines:
             return message(ax, f"no theory of the {title(quantity)}")
         ax.axhline(1.0, color="black", lw=0.8)
-        self._frame(ax, f"{title(quantity)}: ratio to theory{self._constant_note(quantity)}", "computed / theory [-]")
+        self._format(ax, f"{title(quantity)}: ratio to theory{self._constant_note(quantity)}", "computed / theory [-]")
 
-    def _frame(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
+    def _format(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
         """Set scales, title, labels and legend; the legend is beside the axes if there are several curves."""
         labels = parameter_label(self.first, self.sweep.units), y_label
-        frame(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
+        format_axes(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
         if self.others:
             ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
@@ -213,8 +213,8 @@ class Sweep(Report):
         columns = {name: [getattr(point, name) for point in points] for name in ("h", "n_dofs", "seconds")}
         for name in self.quantities:
             columns[name] = [point.values.get(name, math.nan) for point in points]
-            for other, key in DIFFERENCES.items():
-                columns[f"{name}_{key}"] = [point.ratio(name, other) - 1.0 for point in points]
+            for comparison, key in DIFFERENCES.items():
+                columns[f"{name}_{key}"] = [point.ratio(name, comparison) - 1.0 for point in points]
         results = {f"computed_{name}" if name in self.parameters else name: values for name, values in columns.items()}
         return self.structured_known({name: [p.parameters[name] for p in points] for name in self.parameters} | results)
 
@@ -230,8 +230,8 @@ class Sweep(Report):
 
         rows = pandas.concat([solved, pandas.DataFrame([choice | {"failed": text} for choice, text in self.failed])])
         choices = list(itertools.product(*self.parameters.values()))
-        of_rows = rows[list(self.parameters)].itertuples(index=False, name=None)
-        order = np.argsort([choices.index(choice) for choice in of_rows], kind="stable")
+        choices_of_rows = rows[list(self.parameters)].itertuples(index=False, name=None)
+        order = np.argsort([choices.index(choice) for choice in choices_of_rows], kind="stable")
         rows = rows.iloc[order].reset_index(drop=True)
         rows.attrs = solved.attrs
         return rows
@@ -287,15 +287,15 @@ class Sweep(Report):
                 compared = {"theory": "from theory"} | ({"equal_force": "at equal force"} if name != "force" else {})
             values = [number(point.values.get(name, math.nan), 7) for point in self.points]
             columns.append((column(name, name, self.units), values))
-            for other, label in compared.items():
-                columns.append((label, [percent(point.ratio(name, other) - 1.0) for point in self.points]))
-        return [(self.combination if self.combination != self.title else "", rows_from_columns(columns))]
+            for comparison, label in compared.items():
+                columns.append((label, [percent(point.ratio(name, comparison) - 1.0) for point in self.points]))
+        return [(self.combination if self.combination != self.title else "", to_rows(columns))]
 
 
 def _point_dict(point: Point) -> dict[str, Any]:
     """Return the results of a point for JSON."""
     entry: dict[str, Any] = {"parameters": dict(point.parameters), **point.as_dict()}
-    for other, key in DIFFERENCES.items():
-        differences = {name: point.ratio(name, other) - 1.0 for name in getattr(point, other)}
+    for comparison, key in DIFFERENCES.items():
+        differences = {name: point.ratio(name, comparison) - 1.0 for name in getattr(point, comparison)}
         entry[key] = {name: value for name, value in differences.items() if math.isfinite(value)}
     return entry

@@ -148,12 +148,12 @@ def failing(jobs, rows, *_):
 
 
 def no_level(patch):
-    patch.setattr(execute, "_run_jobs", failing)
+    patch.setattr(execute, "_results_of", failing)
     fc.convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"])
 
 
 def no_point(patch):
-    patch.setattr(execute, "_run_jobs", failing)
+    patch.setattr(execute, "_results_of", failing)
     fc.parameter_sweep("forma04a", {"approach": [1.0]})
 
 

@@ -217,9 +217,8 @@ class Assembly:
             return complete
         if (key := key_of(name)) not in self.surfaces:
             faces: dict[Face, None] = {}
-            prefix = f"{scope}." if scope else ""
             for entry in definition.entries:
-                members = self.elements_of(prefix + entry.name, entry.location)
+                members = self.elements_of(qualified(scope, entry.name), entry.location)
                 faces.update(dict.fromkeys(face for element in members for face in self._faces_of(element, entry)))
             self.surfaces[key] = list(faces)
         return self.surfaces[key]
@@ -307,8 +306,7 @@ class Assembly:
 
     def surface_nodes(self, definition: Surface, scope: str) -> list[int]:
         """Return the points of a node-based surface without repetition."""
-        prefix = f"{scope}." if scope else ""
-        points = (self.nodes(prefix + entry.name, entry.location) for entry in definition.entries)
+        points = (self.nodes(qualified(scope, entry.name), entry.location) for entry in definition.entries)
         return list(dict.fromkeys(itertools.chain.from_iterable(points)))
 
     def label_of(self, point: int) -> str:
@@ -337,6 +335,11 @@ class Assembly:
             largest.update((point, max(len(shared), largest.get(point, 0))) for point in shared & remaining)
         further = [face for face, shared in incomplete if any(largest[p] == len(shared) for p in shared & remaining)]
         return [face for face, _ in complete], further, sorted(remaining)
+
+
+def qualified(scope: str, name: str) -> str:
+    """Return the name of a set, a surface or an element of an instance, such as ``Part-1.17``; see `Assembly.split_name`."""
+    return f"{scope}.{name}" if scope else name
 
 
 def facet_points(element: Element, facet: int) -> tuple[int, ...]:

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembly, Element
+from fastcontact.cases.decks.assembled import Assembly, Element, qualified
 from fastcontact.cases.decks.blocks import Block, Location, key_of, look_up, register, unquoted
 from fastcontact.cases.decks.content import Axes, Content, Part
 from fastcontact.mesh.mesh import starts_of
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 
 def orientation(content: Content, part: Part, block: Block) -> None:
@@ -96,7 +96,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
             default = frame
             continue
         for scope in scopes:
-            for element in assembly.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
+            for element in assembly.elements_of(qualified(scope, row.text(0)), row.location):
                 frame_of[id(element)] = frame
     starts = starts_of(assembly.solids_by_type)
     frames = np.tile(np.eye(3), (len(assembly.solids), 1, 1))
@@ -113,7 +113,7 @@ def local_axes(axes: Axes, point: Array) -> Array:
     a, b = np.reshape(axes.points, (2, 3))
     if axes.cylindrical:  # the first axis is radial, the third one along the axis of the cylinder
         third, first = b - a, point - a
-        third = third / max(np.linalg.norm(third), 1e-300)
+        third = third / max(np.linalg.norm(third), TINY)
         first = first - (first @ third) * third
     else:
         first, third = a, np.cross(a, b)

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.cases.decks import interactions
-from fastcontact.cases.decks.assembled import Element
+from fastcontact.cases.decks.assembled import Element, qualified
 from fastcontact.cases.decks.axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.blocks import errors_at, key_of, look_up
 from fastcontact.cases.decks.conditions import Component, Conditions
@@ -93,23 +93,23 @@ class Building:
             self.model.fix(all_points, "xyz"[: mesh.dim])
             add_sectors(self.model, self.assembly)
         else:
-            self._mechanics(conditions)
+            self._add_mechanics(conditions)
         for add in loads:
             add(self.model)
-        self._contact()
+        self._add_contact()
         self.gap_ends = {} if only_heat else add_gaps(self.model, self.assembly, conditions)
         self.ramp = self._ramp(conditions)
 
-    def _mechanics(self, conditions: Conditions) -> None:
+    def _add_mechanics(self, conditions: Conditions) -> None:
         """Add supports, constraints, loads, temperatures and springs to the model."""
-        self._supports(conditions)
+        self._add_supports(conditions)
         self.model.relations += [*self.local_supports, *relations_of(self.assembly, self.model.mesh)]
         add_sections(self.model, self.assembly, self.sections, conditions)
         add_sectors(self.model, self.assembly)
         add_forces(self.model, self.assembly, conditions, self.thickness)
         add_temperatures(self.model, conditions.given_temperatures)
         add_initial_stresses(self.model, self.assembly)
-        self._springs()
+        self._add_springs()
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
         """Return the materials with their groups of solids, and the thickness [length].
@@ -129,8 +129,7 @@ class Building:
                             f"thickness {section_thickness:g} after {thickness:g}: plane models have one thickness"
                         )
                     thickness = section_thickness
-                name = f"{scope}.{section.elements}" if scope else section.elements
-                for element in self.assembly.elements_of(name, section.location):
+                for element in self.assembly.elements_of(qualified(scope, section.elements), section.location):
                     if element.section not in (None, section):
                         raise section.error(
                             f"element {element.number} has a section already, in line {element.section.location.line}"
@@ -183,7 +182,7 @@ class Building:
                 raise pair.error(f"the pair {pair.name} is given twice")
             pair_names.add(key_of(pair.name))
 
-    def _supports(self, conditions: Conditions) -> None:
+    def _add_supports(self, conditions: Conditions) -> None:
         """Add the supports, and record the prescribed motions of nodes that belong to gap elements only.
 
         Supports that do not act in all steps share a constraint if they have the same period and history. A support that
@@ -232,14 +231,14 @@ class Building:
         direction = (conditions.directions[point] if local else np.eye(3))[[axis], : self.assembly.dim]
         return rows_along(np.array([point]), direction, self.model.n_dofs)
 
-    def _springs(self) -> None:
+    def _add_springs(self) -> None:
         """Add the springs. Raises CaseError if an element of *SPRING is not a spring, or a spring has no stiffness."""
         check_discrete(self.assembly, "SPRINGA", self.content.springs, "*SPRING")
         for name, spring in self.content.springs.items():
             for element in self.assembly.elements_of(name, spring.location):
                 self.model.add_spring(element.points[0], element.points[1], axial=spring.stiffness / self.thickness)
 
-    def _contact(self) -> None:
+    def _add_contact(self) -> None:
         """Add the contact pairs and ties of the deck."""
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))

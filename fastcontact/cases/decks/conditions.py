@@ -82,13 +82,13 @@ class Conditions:
     def record(self) -> None:
         """Record the supports and loads of all steps."""
         for block in self.assembly.content.supports:
-            self._supports(block, precedes_steps=True)
+            self._record_supports(block, precedes_steps=True)
         for history in (self.supports, self.fixed_temperatures):
             history.initial, history.step_values = history.step_values, {}
         for number, step in enumerate(self.assembly.content.steps, start=1):
             for block in step.conditions:
                 if block.keyword == "BOUNDARY":
-                    self._supports(block)
+                    self._record_supports(block)
                 else:
                     self.by_keyword[block.keyword].record(block, map(self._load, block.iter_rows()))
             for history in self.histories:
@@ -155,7 +155,7 @@ class Conditions:
             return f"rotation {axis + 1} of a reference node"
         return f"component {axis + 1} of node {self.assembly.label_of(point)}"
 
-    def _supports(self, block: Block, precedes_steps: bool = False) -> None:
+    def _record_supports(self, block: Block, precedes_steps: bool = False) -> None:
         """Record a block *BOUNDARY of the current step or, if `precedes_steps` is true, one that precedes all steps."""
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
@@ -166,7 +166,7 @@ class Conditions:
         displaced_before_steps = False
         for row in block.iter_rows():
             if row.text(1) == "11":
-                self._fix_temperature(block, row)
+                self._record_temperature(block, row)
                 continue
             points = self.assembly.nodes(row.text(0), row.location)
             components, value = NAMED.get(row.text(1).upper()), 0.0
@@ -182,11 +182,11 @@ class Conditions:
             prescribed = Value(value, block.get("AMPLITUDE"), row.location)
             for point in points:
                 for component in components:
-                    self._support(point, component, prescribed, "FIXED" in block.parameters)
+                    self._record_support(point, component, prescribed, "FIXED" in block.parameters)
         if displaced_before_steps:
             self.assembly.content.note(block, "a displacement prescribed before the first step is applied in that step")
 
-    def _fix_temperature(self, block: Block, row: Row) -> None:
+    def _record_temperature(self, block: Block, row: Row) -> None:
         """Record the prescribed temperature of nodes in a line of *BOUNDARY."""
         if not self.assembly.content.heat:
             raise row.error("degree of freedom 11 (temperature) is not within 1 to 6: in static steps use *TEMPERATURE")
@@ -196,7 +196,7 @@ class Conditions:
             value = Value(row.number(3, 0.0), block.get("AMPLITUDE"), row.location)
             self.fixed_temperatures.set_value(point, value)
 
-    def _support(self, point: int, component: int, prescribed: Value, fixed: bool) -> None:
+    def _record_support(self, point: int, component: int, prescribed: Value, fixed: bool) -> None:
         """Record a support of a component of a point, counted from 1; `fixed` is true for FIXED.
 
         Raises CaseError if the component does not exist and the prescribed value is not zero.

@@ -179,13 +179,11 @@ class Deck:
             name: replace(contact, **{key: thickness * getattr(contact, key) for key in EXTENSIVE_FIELDS})
             for name, contact in step.contact.items()
         }
-        sums = {
-            name: _scaled(thickness, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)
-        }
+        sums = [name for name in ("work", "heat") if step.iterations.get(name)]
+        iterations |= {name: _scaled(thickness, step.iterations[name]) for name in sums}
         heat = None if step.heat_reaction is None else thickness * step.heat_reaction
-        return replace(
-            step, reaction=thickness * reaction, contact=contacts, iterations=iterations | sums, heat_reaction=heat
-        )
+        reaction = thickness * reaction
+        return replace(step, reaction=reaction, contact=contacts, iterations=iterations, heat_reaction=heat)
 
     def _support_reactions(self, reaction: Array, instant: float) -> Array:
         """Return the reactions (n_points, dim) [force] at supports, without the forces of multi-point constraints.

@@ -20,7 +20,9 @@ from fastcontact.cases.decks.histories import ByShape, Histories, Period
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
+from fastcontact.round_off import ROUND_OFF
 
+# A function that adds a load to a model.
 Adder = Callable[[Model], None]
 # Names of groups of loaded facets and solids by the kind of the load; groups of other loads are named "load".
 GROUP_NAMES = {"P": "pressure", "S": "heat flux", "BF": "heat source"}
@@ -41,7 +43,7 @@ def add_forces(model: Model, deck_mesh: DeckMesh, conditions: Conditions, thickn
         by_cosine: dict[tuple[int, float], list[int]] = {}
         for point, axis, local in components:
             direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
-            for k in np.flatnonzero(np.abs(direction[: deck_mesh.dim]) > 1e-12).tolist():
+            for k in np.flatnonzero(np.abs(direction[: deck_mesh.dim]) > ROUND_OFF).tolist():
                 by_cosine.setdefault((k, float(direction[k])), []).append(point)
         for (k, cosine), points in by_cosine.items():
             by_shape.add(k, tuple((t, v * cosine / thickness) for t, v in table), points)

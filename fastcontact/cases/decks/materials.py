@@ -131,6 +131,7 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     constants, (D1, *others) = numbers[:n_deviatoric], [*numbers[n_deviatoric:], 0.0][:n_volumetric]
     if any(others):
         raise block.error(f"{current.prefix}only the compressibility constant D1 is supported")
+    # Shear modulus at small strains: the sum of mu_i (Ogden), 2 (C10 + C01) (Mooney-Rivlin) or 2 C10.
     mu = sum(constants[::2]) if kind == "OGDEN" else 2.0 * sum(constants[: 2 if kind == "MOONEY-RIVLIN" else 1])
     nu = DEFAULT_POISSON_RATIO
     bulk = 2.0 / D1 if D1 else 2.0 * mu * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu))

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fastcontact.arrays import Indices
-from fastcontact.cases.decks.assembled import Assembly, Element, Face, assemble, facet_points
+from fastcontact.cases.decks.assembled import Assembly, Element, Face, assemble, facet_points, qualified
 from fastcontact.cases.decks.blocks import Location, key_of
 from fastcontact.cases.decks.content import Content, Surface
 from fastcontact.mesh import elements, topology
@@ -165,7 +165,7 @@ def _add_groups(deck_mesh: DeckMesh) -> None:
             if definition.of_nodes and definition.entries:
                 _add_node_based_surface(deck_mesh, prefix + definition.name, definition, scope)
             elif definition.entries:  # an unused surface may be empty
-                faces = deck_mesh.faces(f"{scope}.{name}" if scope else name, definition.location)
+                faces = deck_mesh.faces(qualified(scope, name), definition.location)
                 deck_mesh.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
             if name not in part.surfaces and members:

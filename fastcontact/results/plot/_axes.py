@@ -84,7 +84,7 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
     return ax
 
 
-def without_matplotlib(error: Exception) -> FastcontactError:
+def matplotlib_error(error: Exception) -> FastcontactError:
     """Return the error for a failed import of Matplotlib, which is missing or was given an unknown backend."""
     if isinstance(error, ImportError):
         return FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'")
@@ -100,7 +100,7 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except (ImportError, ValueError) as error:
-        raise without_matplotlib(error) from error
+        raise matplotlib_error(error) from error
     figure = Figure(figsize=size, layout="constrained", dpi=dpi)
     FigureCanvasAgg(figure)
     panels = figure.subplots(rows, columns, squeeze=False, **options)

@@ -166,18 +166,18 @@ def _mark(
 
 
 def _draw(
-    ax: Axes, plot_field: Field, nodes: Array, edges: bool | None, limits: tuple[float, float], box: Array
+    ax: Axes, plot_field: Field, nodes: Array, edges: bool | None, limits: tuple[float, float], extent: Array
 ) -> Any:  # fmt: skip
     """Draw the cells of a 2D mesh at the positions `nodes` (n_points, 2), and return the artist with the colour scale.
 
-    `limits` are those of the colour scale. By default edges are drawn if at most MOST_EDGES cells lie in the
-    bounding box of the points `box` (n, 2).
+    `limits` are those of the colour scale. By default edges are drawn if at most MOST_EDGES cells lie in the bounding box of
+    the points `extent` (n, 2) [length].
     """
     from matplotlib.collections import PolyCollection
 
     artist = fill(ax, plot_field.mesh.solids, nodes, plot_field.values, plot_field.colours, limits)
     loops = [outlines(name, nodes[cells]) for name, cells in plot_field.mesh.solids.items()]
-    low, high = box.min(axis=0), box.max(axis=0)
+    low, high = extent.min(axis=0), extent.max(axis=0)
     inside = [((loop.max(axis=1) >= low) & (loop.min(axis=1) <= high)).all(axis=1) for loop in loops]
     if edges if edges is not None else sum(int(mask.sum()) for mask in inside) <= MOST_EDGES:
         for loop in loops:

@@ -62,12 +62,12 @@ def contact_map(
     title, units
         Described for `pressure_profile`.
     axes : sequence of matplotlib Axes, optional
-        Axes of the pressure and, with friction, of the other quantity; by default those of a new figure.
+        Axes of the pressure and of the other quantity; by default those of a new figure.
 
     Returns
     -------
     tuple of matplotlib Axes
-        Axes of the pressure and, with friction, of the other quantity.
+        Axes of the pressure and, unless it is zero everywhere, of the other quantity.
 
     Raises
     ------
@@ -99,14 +99,14 @@ def contact_map(
     check_known("field beside the pressure", beside, known, FastcontactError)
     caption, quantity, beside_values = *SECOND_FIELDS[beside], getattr(contact, beside)
     size = np.linalg.norm(beside_values.reshape(len(flat), -1), axis=1)
-    two_maps = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0) >= 0.0)
+    two_maps = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0))
     panels = _panels(axes, two_maps)
     fields = [(contact.pressure, "contact pressure", "pressure"), (size, caption, quantity)]
     for ax, (values, caption, quantity) in zip(panels, fields, strict=False):
-        ends = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
-        artist = fill(ax, blocks, flat, values, "viridis", ends)
-        high = _set_limits(ax, flat, _loaded_nodes(contact, blocks) & ~np.array(everything))
-        bar = {"location": "bottom", "shrink": 0.6} if high == FLAT else {"shrink": 0.75 * high}
+        limits = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
+        artist = fill(ax, blocks, flat, values, "viridis", limits)
+        relative_height = _set_limits(ax, flat, _loaded_nodes(contact, blocks) & (not everything))
+        bar = {"location": "bottom", "shrink": 0.6} if relative_height == FLAT else {"shrink": 0.75 * relative_height}
         ax.figure.colorbar(artist, ax=ax, label=axis_label(caption, units, quantity), **bar)
         _mark_nodes(ax, flat, contact, two_maps)
         x_label, y_label = (axis_label(label, units, "length") for label in labels)
@@ -116,7 +116,7 @@ def contact_map(
         large = size > 0.1 * size.max()  # the direction of small vectors is not shown
         panels[1].quiver(*flat[large].T, *(beside_values @ basis.T)[large].T, color="white", width=0.004, pivot="tail")
     if axes is None:
-        panels[0].figure.set_figheight(1.6 + 3.0 * high)
+        panels[0].figure.set_figheight(1.6 + 3.0 * relative_height)
     panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")
     if contact.active.any():
         panels[0].legend(loc="upper right", fontsize=8)
@@ -166,11 +166,11 @@ def _projection(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
     return view_axes(total / np.linalg.norm(total), 0.9)
 
 
-def _mark_nodes(ax: Any, flat: Array, contact: ContactResult, friction: bool) -> None:
-    """Mark the closed nodes and, with `friction`, the sliding nodes among them."""
-    sliding = contact.active & ~contact.sticking & friction
+def _mark_nodes(ax: Any, flat: Array, contact: ContactResult, distinguish: bool) -> None:
+    """Mark the closed nodes at their positions `flat` (m, 2); if `distinguish` is true, mark sliding nodes differently."""
+    sliding = contact.active & ~contact.sticking & distinguish
     closed = contact.active & ~sliding
-    states = (("sticking" if friction else "closed", closed, "white"), ("sliding", sliding, "tab:orange"))
+    states = (("sticking" if distinguish else "closed", closed, "white"), ("sliding", sliding, "tab:orange"))
     for state, nodes, colour in states:
         if nodes.any():
             ax.plot(*flat[nodes].T, "o", ms=3, mfc=colour, mec="black", mew=0.4, label=state)

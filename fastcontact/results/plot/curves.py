@@ -294,10 +294,10 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
             f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
         )
     # Both bodies have a node where the axis intersects the surface. The side of the cells of such a node determines its body.
-    body_side = _sides(mesh, nodes, origin, direction)
+    body_side = _body_sides(mesh, nodes, origin, direction)
     side = np.where(np.abs(height) > tolerance, np.sign(height), body_side).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
-    return np.abs(height)[order], side[order], _rotated(step.stress[nodes], direction)[order]
+    return np.abs(height)[order], side[order], _rotated_stress(step.stress[nodes], direction)[order]
 
 
 def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
@@ -312,7 +312,7 @@ def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
     return contact.coordinates[nearest], direction
 
 
-def _rotated(stress: Array, direction: Array) -> Array:
+def _rotated_stress(stress: Array, direction: Array) -> Array:
     """Return the stress (n, 4) in rotated axes, y along the `direction` (2,) and x normal to it [pressure]."""
     x, y = np.array([direction[1], -direction[0]]), direction
     tensor = stress[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
@@ -320,7 +320,7 @@ def _rotated(stress: Array, direction: Array) -> Array:
     return np.column_stack([xx, yy, stress[:, 2], xy])
 
 
-def _sides(mesh: Mesh, nodes: AnyArray, origin: Array, direction: Array) -> Array:
+def _body_sides(mesh: Mesh, nodes: AnyArray, origin: Array, direction: Array) -> Array:
     """Return the side (n,), 1 or -1, on which the cells of each node lie; see `stresses_on_axis`."""
     total = np.zeros(mesh.n_points)
     for block in mesh.solids.values():

@@ -18,7 +18,7 @@ MOST_SUBDIVIDED = 5000
 
 
 def fill(
-    ax: Any, blocks: Mapping[str, AnyArray], points: Array, values: Array, colours: str, ends: tuple[float, float]
+    ax: Any, blocks: Mapping[str, AnyArray], points: Array, values: Array, colours: str, limits: tuple[float, float]
 ) -> Any:
     """Fill cells with the colours of a field that is interpolated by their shape functions.
 
@@ -34,7 +34,7 @@ def fill(
         Values of the field [any unit].
     colours : str
         Name of the colour map.
-    ends : (float, float)
+    limits : (float, float)
         Values of the first and the last colour [unit of `values`].
 
     Returns
@@ -55,17 +55,17 @@ def fill(
         triangles.append((start + len(shape) * np.arange(len(cells))[:, None, None] + pieces).reshape(-1, 3))
         start += len(shape) * len(cells)
     x, values = np.concatenate(positions), np.concatenate(interpolated)
-    return fill_triangles(ax, x, np.concatenate(triangles), values, colours, ends)
+    return fill_triangles(ax, x, np.concatenate(triangles), values, colours, limits)
 
 
 def fill_triangles(
-    ax: Any, points: Array, triangles: AnyArray, values: Array, colours: str, ends: tuple[float, float]
+    ax: Any, points: Array, triangles: AnyArray, values: Array, colours: str, limits: tuple[float, float]
 ) -> Any:
     """Fill triangles (m, 3) between `points` (n, 2) with linearly interpolated `values` (n,); see `fill`."""
     from matplotlib.tri import Triangulation
 
     mesh = Triangulation(points[:, 0], points[:, 1], triangles)
-    return ax.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=ends[0], vmax=ends[1])
+    return ax.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=limits[0], vmax=limits[1])
 
 
 def outlines(name: str, corners: Array) -> Array:

@@ -131,11 +131,11 @@ TICK_LABEL_DISTANCE, AXIS_LABEL_DISTANCE, SMALLEST_BOX = 6.0, 17.0, 0.05
 
 def draw_solid(
     ax: Any, plot_field: Field, points: Array, edges: bool | None, view: tuple[float, float],
-    colours: tuple[float, float],
+    limits: tuple[float, float],
 ) -> Any:  # fmt: skip
     """Draw the visible part of the outer surface, and return the mappable for a colour bar.
 
-    `points` (n_points, 3) are the positions of the points [length], and `colours` are the values of the first and the last
+    `points` (n_points, 3) are the positions of the points [length], and `limits` are the values of the first and the last
     colour. `edges` states whether the outlines of facets are drawn; by default they are for up to MOST_EDGES facets. `view`
     contains the elevation and the azimuth of the viewer [degree].
     """
@@ -144,17 +144,17 @@ def draw_solid(
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    facing, screen = _facing(plot_field, points, viewer_direction(view))
+    facing, screen = _facing_facets(plot_field, points, viewer_direction(view))
     pieces, values, strokes = [], [], []
     for name, corners, field, flat in facing:
         weights = _subdivision(CUTS if elements.get(name).order == 1 else 1)
         triangles = np.einsum("pcw,ftwd->ftpcd", weights, corners[:, flat]).reshape(-1, 3, 3)
         corner_values = np.einsum("pcw,ftw->ftpc", weights, field[:, flat]).reshape(-1, 3)
-        visible, visible_values = _visible(triangles, corner_values, screen)
+        visible, visible_values = _visible_parts(triangles, corner_values, screen)
         pieces.append(visible)
         values.append(visible_values.mean(axis=1))
         strokes.append(_visible_strokes(_outline(name, corners), screen))
-    norm = Normalize(*colours)
+    norm = Normalize(*limits)
     faces = colormaps[plot_field.colours](norm(np.concatenate(values)))
     polygons = list(np.concatenate(pieces))
     lines = faces.copy()  # lines in the colour of the face close hairline gaps between faces
@@ -210,7 +210,7 @@ def _place_labels(ax: Any, size: Array, eye: Array, horizontal: Array) -> None:
 
 def shows_extreme(plot_field: Field, points: Array, view: tuple[float, float]) -> bool:
     """Return whether the extreme value of a field at the positions `points` (n_points, 3) is visible from `view`."""
-    _, screen = _facing(plot_field, points, viewer_direction(view))
+    _, screen = _facing_facets(plot_field, points, viewer_direction(view))
     return not bool(screen.hidden(points[[plot_field.extreme]])[0])
 
 
@@ -225,7 +225,9 @@ def viewer_direction(view: tuple[float, float]) -> Array:
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
 
 
-def _facing(plot_field: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
+def _facing_facets(
+    plot_field: Field, points: Array, eye: Array
+) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
     """Return the facets that face the viewer, and the screen with their triangles.
 
     For each element type of facets there are its name, the positions and values at the nodes of the facets, and the local
@@ -234,7 +236,7 @@ def _facing(plot_field: Field, points: Array, eye: Array) -> tuple[list[tuple[st
     mesh, node = plot_field.mesh, plot_field.node
     cut = len(node) != node.max(initial=-1) + 1
     facing = []
-    for name, facets in (_without_cuts(mesh, node) if cut else outer_facets(mesh)).items():
+    for name, facets in (_facets_without_cuts(mesh, node) if cut else outer_facets(mesh)).items():
         flat = flat_triangles(facets.shape[1])
         a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
         visible = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
@@ -243,7 +245,7 @@ def _facing(plot_field: Field, points: Array, eye: Array) -> tuple[list[tuple[st
     return facing, Screen(np.concatenate(triangles), eye)
 
 
-def _visible(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
+def _visible_parts(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
     """Return the visible parts of triangles (n, 3, 3) and the values (n, 3) at their corners.
 
     Partly hidden triangles are divided recursively into four. The smallest triangles are kept if their centre is visible.
@@ -275,7 +277,7 @@ def _visible_strokes(strokes: Array, screen: Screen) -> Array:
     return np.concatenate([strokes[visible], segments[partly][~hidden[partly]]])
 
 
-def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
+def _facets_without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
     """Return the outer facets except those along internal cuts, where two facets have the same nodes."""
     blocks = {}
     for name, facets in outer_facets(mesh).items():

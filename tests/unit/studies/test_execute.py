@@ -53,7 +53,7 @@ def deadly(job, threads):
 
 @pytest.fixture
 def jobs(monkeypatch):
-    monkeypatch.setattr(execute, "run", deadly)
+    monkeypatch.setattr(execute, "execute_run", deadly)
     return [SimpleNamespace(label=name, size=size) for name, size in (("first", 1), ("deadly", 3), ("last", 2))]
 
 
@@ -175,7 +175,7 @@ def test_a_run_that_goes_wrong_in_any_way_is_a_result(monkeypatch):
         raise ZeroDivisionError("by nothing")
 
     monkeypatch.setattr(job.Job, "evaluate", wrong)
-    found = job.run(of())
+    found = job.execute_run(of())
     assert found["kind"] == "ZeroDivisionError"
     assert found["error"].startswith("by nothing (wrong, line ")
 
@@ -256,7 +256,7 @@ def dies(job, threads=None):
     os.kill(os.getpid(), signal.SIGKILL)
 
 if __name__ == "__main__":
-    execute.run = dies
+    execute.execute_run = dies
     from fastcontact.cli import main
     sys.exit(main(sys.argv[1:]))
 """
@@ -327,7 +327,7 @@ def test_threads_keep_the_environment_of_the_process(case, monkeypatch):
     """What is compiled meanwhile reads it: one thread there would be one for the rest of the process."""
     seen = []
     monkeypatch.setattr(
-        "fastcontact.studies.execute.run", lambda job, threads: seen.append(dict(os.environ)) or {"error": ""}
+        "fastcontact.studies.execute.execute_run", lambda job, threads: seen.append(dict(os.environ)) or {"error": ""}
     )
     before = dict(os.environ)
     with ThreadPoolExecutor(1) as pool:

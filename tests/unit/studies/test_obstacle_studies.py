@@ -13,7 +13,7 @@ from fastcontact.studies import quantities
 from fastcontact.studies.convergence_report import sentences
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.job import job_of
-from fastcontact.studies.settings import RULES, combinations, make_mesh, one_combination, recipe, settings
+from fastcontact.studies.settings import RULES, combinations, make_mesh, matching_combination, recipe, settings
 
 BALL = """kinematics = "axisymmetric"
 mesh = { file = "block.med" }
@@ -109,7 +109,7 @@ def test_an_obstacle_takes_every_formulation(ball):
     every = [c.formulation for c in combinations(chosen, None, ["all"])]
     assert every == ["continuous", "mortar", "node_to_segment"]
     case = read_case(ball)
-    job = job_of(case, chosen, one_combination(chosen, None, "node-to-segment"), 0, label="", marks={}, size=0.0)
+    job = job_of(case, chosen, matching_combination(chosen, None, "node-to-segment"), 0, label="", marks={}, size=0.0)
     assert job.data["obstacle"]["ball"]["formulation"] == "node_to_segment"
     assert job.data["obstacle"]["ball"]["motion"] == {"y": -0.1}
 
