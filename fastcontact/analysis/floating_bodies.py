@@ -7,7 +7,8 @@ last position.
 
 If the matrix is factorised, the linear response of the contact problem to the position is known, and Newton's method finds
 the position at which the springs are slack. Once the contact state no longer changes, one Newton step suffices, whatever
-the stiffness of the springs.
+the stiffness of the springs. With friction, the first position is that of bodies on springs so soft that their forces are
+negligible, see `SoftSprings`.
 
 Otherwise the springs are soft compared with the body, and the new position is that at which they would be slack without
 contact. This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar,
@@ -27,16 +28,19 @@ from typing import Any
 import numpy as np
 from numpy.linalg import LinAlgError, norm
 from scipy.linalg import qr
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
-from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS, NOTABLE
+from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
 from fastcontact.analysis.solution import Response, Solution
-from fastcontact.arrays import Array, Indices, Mask, largest
+from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.springs import Springs
+from fastcontact.linear.delassus import solve_multipliers
+from fastcontact.linear.field_compliance import FieldCompliance
+from fastcontact.linear.protocol import Loaded, Monitor
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
@@ -48,11 +52,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 # body, because a contact is not stiffer than the softer one of its bodies (for a layer that is softer by a
 # factor of 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT = 1e-3
-# Largest factor by which elongations may grow in a step in which bodies slide until friction balances the springs. They need
-# not decrease, as the directions of friction change. Without this limit, a blade in a dovetail, half of which is at either
-# end of a cyclic sector, slides to and fro for 40 positions. With a factor of 1, it does so for other coefficients
-# of friction.
-GROWTH = 4.0
 
 
 @dataclass(frozen=True)
@@ -94,11 +93,8 @@ class PositionResponse:
         Derivatives of the elongations of the springs with respect to the positions [-].
     springs : ndarray of int (k,)
         Numbers of the unknowns at springs.
-    gap_rates : ndarray (1 + d, m, k)
-        Derivatives of the gaps of all m constraints, and of their slips along d tangents, with respect to the positions, for
-        rigid-body motions [-].
-    stiffness : float
-        Stiffness of each spring [force / length].
+    gap_rates : ndarray (m, k)
+        Derivatives of the gaps of all m constraints with respect to the positions, for rigid-body motions [-].
     """
 
     anchored: Response
@@ -106,57 +102,23 @@ class PositionResponse:
     elongation_rates: Array
     springs: Indices
     gap_rates: Array
-    stiffness: float
 
-    def slack_position_change(self, elongation: Array, solution: Solution, last_slide: Array) -> tuple[Array, float]:
+    def slack_position_change(self, elongation: Array, solution: Solution) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        If contact hardly restrains a motion, the bodies slide until friction balances the springs, provided that they slide
-        by more than the elongations. If contact does not restrain a motion at all and the bodies do not slide, they move by
-        the elongations, and then further until the first gap of the `solution` closes. The norm of the elongations that
-        remain according to the linear response is returned as well; it is infinite if bodies slide, because the linear
-        response does not include sliding. Bodies do not slide back from `last_slide` (k,), the change in which they have
-        just slid, or zero. Without this rule, a gasket between cyclic flanges slides to and fro for 40 positions.
+        If contact does not restrain a motion, the bodies move by the elongations, and then further until the first gap of the
+        `solution` closes. The norm of the elongations that remain according to the linear response is returned as well.
         """
-        position_error, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
+        position_error = self._inverse @ elongation
         remaining = float(norm(elongation - self.elongation_rates @ position_error))
-        restrained = remaining <= SINGLE_PRECISION * norm(elongation)
-        # The linear response is more accurate than minimising the work of friction if it hardly changes the slips.
-        slip_change = largest(self.gap_rates[1:, sliding] @ position_error)
-        if not restrained or slip_change > NOTABLE * largest(solution.slip[sliding]):
-            U, s, V = np.linalg.svd(self.elongation_rates)
-            # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for
-            # example only because the friction force turns with the slip direction (a box that rides on a driven one in 3D).
-            firm = s > NOTABLE
-            slide = self._slide(V[~firm].T, elongation, solution, sliding)
-            if largest(slide) > largest(elongation) and slide @ last_slide >= 0.0:
-                return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
-        change = -position_error
-        if not restrained:
-            motion = elongation - self._inverse @ (self.elongation_rates @ elongation)
-            approach, threshold = -self.gap_rates[0] @ motion, LENGTH_ROUND_OFF * remaining
-            # Gaps of active constraints are round-off.
-            closing = ~solution.active & (solution.gap > 0.0) & (approach > threshold)
-            if closing.any():
-                change += motion * np.min(solution.gap[closing] / approach[closing])
-            change += motion
-        return change, remaining
-
-    def _slide(self, motions: Array, elongation: Array, solution: Solution, sliding: Mask) -> Array:
-        """Return the change (k,) of positions until friction at the `sliding` constraints (m,) balances the springs [length].
-
-        The change, a combination of `motions` (k, z) of rigid bodies, minimises the work of friction under constant normal
-        forces, less that of the loads. It is zero if friction cannot balance the springs.
-        """
-        along, slip, friction = self.gap_rates[1:, sliding], solution.slip[sliding].T, solution.tangential[sliding].T
-        rates, limit, spring_force = along @ motions, np.hypot.reduce(friction), self.stiffness * elongation
-        size, force = largest(np.hypot.reduce(slip)), limit.sum()
-        if largest(rates) <= LENGTH_ROUND_OFF or not size or largest(limit) <= ROUND_OFF * largest(spring_force):
-            return np.zeros_like(elongation)
-        load = motions.T @ spring_force - np.einsum("dmz,dm", rates, friction)
-        tangent = -self.stiffness * size / force * (motions.T @ self.elongation_rates @ motions)
-        amplitudes, unbalanced = _least_work(rates, slip / size, limit / force, load / force, tangent)
-        return motions @ amplitudes * (size * (unbalanced <= SINGLE_PRECISION))
+        if remaining <= SINGLE_PRECISION * norm(elongation):
+            return -position_error, remaining
+        motion = elongation - self._inverse @ (self.elongation_rates @ elongation)
+        approach, threshold = -self.gap_rates @ motion, LENGTH_ROUND_OFF * remaining
+        # Gaps of active constraints are round-off.
+        closing = ~solution.active & (solution.gap > 0.0) & (approach > threshold)
+        further = float(np.min(solution.gap[closing] / approach[closing])) if closing.any() else 0.0
+        return (1.0 + further) * motion - position_error, remaining
 
     def respond(self, force: Array, gaps: Array) -> Array:
         """Return the change of the unknowns (n,), like a `Response`, if the springs stay slack."""
@@ -170,51 +132,54 @@ class PositionResponse:
         return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
 
 
-def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: Array) -> tuple[Array, float]:
-    """Return amplitudes a (z,) that minimise the sum of ``limit |slip + rates a|``, minus ``load a``, plus elastic energy.
+@dataclass(frozen=True, eq=False)
+class SoftSprings(Loaded):
+    """A prepared matrix with a right-hand side, in which the springs are softer by the factor SINGLE_PRECISION.
 
-    The lengths of the slips are smoothed by a parameter that decreases in steps. For each value of the parameter, Newton's
-    method with a trust region minimises the sum. All data are dimensionless, with magnitudes of about 1. The largest
-    component of the gradient is returned as well; it is not small if there is no minimum.
+    Each spring is in series with a soft one, whose elongation is a rigid-body motion of the bodies.
 
-    Parameters
+    Attributes
     ----------
-    rates : ndarray (d, m, z)
-        Changes of the slips of m constraints along d tangents, for each amplitude.
-    slip : ndarray (d, m)
-    limit : ndarray (m,)
-        Largest friction forces.
-    load : ndarray (z,)
-    tangent : ndarray (z, z)
-        Stiffness. The part that is not due to the rotation of friction forces stores elastic energy.
+    loaded : Loaded
+        The matrix (n, n) with the stiff springs.
+    modes : ndarray (n, k)
+        Rigid-body modes, each of which elongates one spring by 1 [-].
+    load : ndarray (k,)
+        Generalised forces of the right-hand side in these modes [force].
+    stiffness : float
+        Stiffness of each soft spring [force / length].
     """
-    from scipy.optimize import minimize
 
-    def lengths(a: Array) -> tuple[Array, Array]:
-        total = slip + rates @ a
-        length = np.sqrt((total**2).sum(axis=0) + smoothing**2)
-        return length, np.einsum("dm,dmz->mz", total / length, rates)
+    loaded: Loaded
+    modes: Array
+    load: Array
+    stiffness: float
 
-    def work(a: Array) -> float:
-        return float(limit @ lengths(a)[0] + (0.5 * elastic @ a - load) @ a)
+    def solve(
+        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """See `Loaded`."""
+        free, F = self.delassus(B)
+        multiplier = solve_multipliers(F + self.rigid_compliance(B), c - free, C)
+        return self.full_solution(B.T @ multiplier), multiplier
 
-    def gradient(a: Array) -> Array:
-        return np.asarray(limit @ lengths(a)[1] + elastic @ a - load)
+    def delassus(self, R: csr_array) -> tuple[Array, Array]:
+        """See `Loaded`."""
+        free, F = self.loaded.delassus(R)
+        return free + (R @ self.modes) @ self.load / self.stiffness, F
 
-    def hessian(a: Array) -> Array:
-        length, along = lengths(a)
-        weights = limit / length
-        turning = np.einsum("dmz,m,dmy", rates, weights, rates) - np.einsum("mz,m,my", along, weights, along)
-        return np.asarray(turning + elastic)
+    def rigid_compliance(self, R: csr_array) -> Array | float:
+        """See `Loaded`."""
+        gap_rates = R @ self.modes
+        return np.asarray(gap_rates @ gap_rates.T / self.stiffness)
 
-    a, smoothing, elastic = np.zeros(len(load)), SINGLE_PRECISION, np.zeros_like(tangent)
-    values, vectors = np.linalg.eigh(0.5 * (tangent + tangent.T) - hessian(a))
-    elastic = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    smoothing, options = 1.0, {"maxiter": MAX_NEWTON_ITERATIONS}
-    while smoothing > SINGLE_PRECISION:
-        smoothing *= 0.1
-        a = minimize(work, a, jac=gradient, hess=hessian, method="trust-exact", tol=SINGLE_PRECISION, options=options).x
-    return a, largest(gradient(a))
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
+        """See `Loaded`."""
+        # The elongations of the stiff springs would include round-off of the displacements without contact, which are large
+        # if bodies are flexible.
+        elongation = (self.load + self.modes.T @ force) / self.stiffness
+        return np.asarray(self.loaded.full_solution(force) + self.modes @ elongation)
 
 
 class FloatingBodies:
@@ -294,11 +259,19 @@ class FloatingBodies:
         """Return the linear response to positions of the springs, given `respond` for springs at a fixed position."""
         modes, springs = self.motions.displacement, dofs.numbers(self.dofs)
         changes = np.stack([rows @ modes for rows in (constraints.B, *constraints.tangents)])
-        zero_lift = np.zeros(len(modes))
-        rigid = np.stack([dofs.unknowns(mode, zero_lift) for mode in modes.T], axis=1)
+        rigid = self._unknowns(dofs)
         unloaded = np.zeros(len(rigid))
         strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(changes, -1, 0)], axis=1)
-        return PositionResponse(respond, rigid + strained, strained[springs], springs, changes, self.stiffness)
+        return PositionResponse(respond, rigid + strained, strained[springs], springs, changes[0])
+
+    def with_soft_springs(self, loaded: Loaded, dofs: ActiveDofs, load: Array) -> SoftSprings:
+        """Return the prepared matrix `loaded` with soft springs, given the generalised forces `load` (k,) [force]."""
+        return SoftSprings(loaded, self._unknowns(dofs), load, SINGLE_PRECISION * self.stiffness)
+
+    def _unknowns(self, dofs: ActiveDofs) -> Array:
+        """Return the active unknowns (n, k) in the free rigid-body modes."""
+        zero_lift = np.zeros(len(self.motions.displacement))
+        return np.stack([dofs.unknowns(mode, zero_lift) for mode in self.motions.displacement.T], axis=1)
 
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as a dict of numbers and strings.
@@ -373,8 +346,8 @@ class FloatingBodies:
         start : ndarray (k,)
             First position [length].
         load : float
-            Scale of the loads. Springs are slack if their forces are negligible compared with it or with the largest
-            contact force [force].
+            Scale of the loads. Springs are slack if their forces are negligible compared with it or with the sum of the
+            contact forces [force].
         noise : float
             Relative accuracy of displacements, due to the tolerance of the linear solver [-].
         round_off : float
@@ -386,14 +359,14 @@ class FloatingBodies:
             The last position, also if the springs do not become slack or if a contact problem does not converge.
         """
         anchor, last_stretch, iterations, newton_stretch = start, np.inf, 0, 0.0
-        step, length, slide_bound = None, 1.0, np.inf
+        step, length = None, 1.0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
             solution = solve_at(anchor)
             elongation, u_error = solution.u[springs], noise * largest(solution.u)
             iterations += solution.iterations
             stretch = float(norm(elongation))
-            load_stretch = max(load, float(np.abs(solution.multiplier).max(initial=0.0))) / self.stiffness
+            load_stretch = max(load, float(np.abs(solution.multiplier).sum())) / self.stiffness
             # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if
             # prescribed displacements move the bodies), as small as the accuracy of the linear solver allows, or round-off of
             # the elongation before a Newton step.
@@ -403,27 +376,21 @@ class FloatingBodies:
                 slack = stretch <= max(LENGTH_ROUND_OFF * load_stretch, round_off)
             if slack or not solution.settled or positions == MAX_NEWTON_ITERATIONS:
                 break
-            if step is not None and length > 0.5**HALVINGS:
-                # Elongations need not decrease when bodies slide.
-                sliding = step[1] == np.inf
-                bound = slide_bound if sliding else last_stretch - DECREASE * length * (last_stretch - step[1])
-                if stretch > bound:
-                    length *= 0.5
-                    anchor = anchor - length * step[0]
-                    continue
-            last_slide = step[0] if step is not None and step[1] == np.inf else np.zeros_like(anchor)
+            bound = np.inf if step is None else last_stretch - DECREASE * length * (last_stretch - step[1])
+            if step is not None and length > 0.5**HALVINGS and stretch > bound:
+                length *= 0.5
+                anchor = anchor - length * step[0]
+                continue
             step, length = None, 1.0
             if stretch > last_stretch:
                 mixing.restart()
             elif position_response is not None and solution.response is not None:
                 with suppress(LinAlgError):  # the constraints are linearly dependent
                     linear = position_response(solution.response())
-                    step = linear.slack_position_change(elongation, solution, last_slide)
+                    step = linear.slack_position_change(elongation, solution)
             # Without Newton's method, the iteration is accelerated, because parts much softer than the springs, such as
             # a peeling layer, approach equilibrium slowly.
             anchor = mixing.mixed(anchor, anchor + elongation) if step is None else anchor + step[0]
             last_stretch, newton_stretch = stretch, 0.0 if step is None else stretch
-            if step is not None and step[1] == np.inf:
-                last_stretch, slide_bound = np.inf, max(GROWTH * stretch, load_stretch)
         solution = dataclasses.replace(solution, iterations=iterations)
         return RigidPosition(solution, anchor, self.stiffness * elongation, positions, slack)

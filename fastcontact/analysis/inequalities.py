@@ -27,7 +27,7 @@ from fastcontact.linear.protocol import Loaded
 from fastcontact.model.model import gap_changes
 from fastcontact.model.pretension import loose_bolts_remark
 from fastcontact.model.rigid_motions import cone_rows, generalised, grouped, needed_friction, stopped_at
-from fastcontact.round_off import SINGLE_PRECISION
+from fastcontact.round_off import SINGLE_PRECISION, SUM_ROUND_OFF
 
 # Number of times that contact displaces fluid from a node in a load step after which the node stays dry. At the front of the
 # fluid a node may be neither dry, because its mean pressure is below that of the fluid, nor wet, because its gap would close.
@@ -253,7 +253,7 @@ def _with_floating_bodies(
     problem, state, lift, dofs = step.problem, step.state, step.load.lift, step.problem.dofs
     last_active, guess = active, iterate.u
 
-    def solve_at(anchor: Array) -> Solution:
+    def solve_at(anchor: Array, step: StepContext = step) -> Solution:
         nonlocal last_active, guess
         shifted_lift = lift + bodies.rigid(anchor)
         solution = _solve(step, constraints, iterate, last_active, accuracy, shifted_lift, guess)
@@ -290,12 +290,26 @@ def _with_floating_bodies(
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     position_response = None if problem.solver.iterative else partial(bodies.position_response, constraints, dofs)
     springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
-    rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, state.gap_round_off)
+    soft_iterations, round_off = 0, state.gap_round_off
+    if position_response is not None:
+        # Displacements without contact forces, which are large if bodies are flexible, cancel.
+        round_off = max(round_off, SUM_ROUND_OFF * largest(step.loaded.full_solution(np.zeros(dofs.T.shape[1]))))
+    if position_response is not None and constraints.tangents:
+        # With stiff springs, a problem with friction may have several solutions, and none near the position of equilibrium.
+        last_frictional, softened = iterate.frictional, bodies.with_soft_springs(step.loaded, dofs, loads[0])
+        softly_held = solve_at(start, replace(step, loaded=softened))
+        soft_iterations = softly_held.iterations
+        if softly_held.settled:
+            start = start + softly_held.u[springs]
+        else:
+            iterate.frictional = last_frictional
+    rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, round_off)
     if rigid.solution.settled and not rigid.slack:
         gaps = gap_changes(problem.model, bodies.motions)
         raise failure(not_restrained(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
-    solution, respond = rigid.solution, rigid.solution.response
+    solution = replace(rigid.solution, iterations=rigid.solution.iterations + soft_iterations)
+    respond = solution.response
     if position_response is not None and respond is not None:
         solution = replace(solution, response=lambda: position_response(respond()).respond)
     return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.anchor))

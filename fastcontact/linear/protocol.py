@@ -91,6 +91,10 @@ class Loaded(Protocol):
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """Return ``R K^-1 f`` (m,) [length] and the Delassus operator ``R K^-1 R.T`` (m, m) [length / force] for R (m, n)."""
 
+    def rigid_compliance(self, R: csr_array) -> Array | float:
+        """Return the part (m, m) of the Delassus operator that `delassus` omits, due to motions of rigid bodies."""
+        return 0.0
+
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) [length].
 

@@ -155,6 +155,7 @@ def _with_included(
     held_slips = held_tangents(C)
     held_rows = np.flatnonzero(held_slips) + len(rows)
     _add_compliance(F, constraints, rows)
+    F += loaded.rigid_compliance(R)
     free = free.reshape(1 + k, -1) + gaps_at_rest[:, rows]
     guess = None if forces is None else forces[:, rows]
     y0, closing = np.zeros_like(free), np.zeros_like(free)

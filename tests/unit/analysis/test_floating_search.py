@@ -6,10 +6,17 @@ import numpy as np
 import pytest
 from models import elastic_model, made_of, plates, supported, united
 from pairwise import first_of
+from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis.floating_bodies import MAX_NEWTON_ITERATIONS, FloatingBodies, PositionResponse
+from fastcontact.analysis.floating_bodies import (
+    MAX_NEWTON_ITERATIONS,
+    FloatingBodies,
+    PositionResponse,
+    SoftSprings,
+)
 from fastcontact.analysis.solution import Solution
+from fastcontact.linear.factor_solver import CondensedProblem
 
 DOFS = np.array([0])
 
@@ -68,7 +75,7 @@ def test_newton_steps_that_overshoot_are_halved(start):
         return dataclasses.replace(solution(-stretch), response=lambda: None)
 
     def freed(held):
-        return PositionResponse(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS, np.zeros((1, 1, 1)), 1.0)
+        return PositionResponse(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS, np.zeros((1, 1)))
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.array([start]), 1.0, 0.0, 0.0)
     assert found.slack
@@ -93,7 +100,7 @@ def test_a_body_moves_on_to_the_gap_that_stops_it():
     def freed(held):
         closed = calls[-1] + 1.0 > gap
         stretched = np.array([[-stiffness / (1.0 + stiffness) if closed else 0.0]])
-        return PositionResponse(held, np.eye(1), stretched, DOFS, np.array([[[-1.0], [1.0], [-1e-6]]]), 1.0)
+        return PositionResponse(held, np.eye(1), stretched, DOFS, np.array([[-1.0], [1.0], [-1e-6]]))
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert found.slack
@@ -135,16 +142,13 @@ def test_slack_is_in_units_of_the_contact_forces(force):
     assert found.anchor[0] > 0.5
 
 
-def test_bodies_do_not_slide_back():
-    """Friction of one constraint drives a body, and that of the other, which has slipped by 2, brakes it."""
-    on, rates = np.array([True, True]), np.array([[[0.0], [0.0]], [[1.0], [-1.0]]])
-    sliding = Solution.frictionless(np.zeros(1), np.zeros(2), np.zeros(2), on, on)
-    sliding = dataclasses.replace(sliding, sticking=~on, slip=np.array([[1.0], [2.0]]), tangential=np.ones((2, 1)))
-    response = PositionResponse(lambda force, gaps: force, np.eye(1), np.array([[-0.01]]), DOFS, rates, 1.0)
-    for last_slide, change, remaining in ((0.0, 2.0, np.inf), (5.0, 2.0, np.inf), (-5.0, 10.0, 0.0)):
-        found = response.slack_position_change(np.array([0.1]), sliding, np.array([last_slide]))
-        assert found[0] == pytest.approx([change], rel=1e-6)
-        assert found[1] == remaining
+def test_soft_springs_act_as_in_a_matrix_that_contains_them():
+    """Two masses joined by a spring; a stiff and a soft spring in series hold the first."""
+    K, load, B, c = np.array([[2.0, -2.0], [-2.0, 2.0]]), np.array([0.3, 0.4]), csr_array([[0.2, 1.0]]), np.array([0.5])
+    stiff, series = (np.linalg.inv(K + np.diag([k, 0.0])) for k in (3.0, 1.0 / (1.0 / 3.0 + 1.0 / 0.01)))
+    soft = SoftSprings(CondensedProblem(stiff, stiff @ load), np.ones((2, 1)), load.sum(keepdims=True), 0.01)
+    for found, expected in zip(soft.solve(B, c), CondensedProblem(series, series @ load).solve(B, c), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-11)
 
 
 def carried(dim, options, angle):
@@ -279,6 +283,27 @@ def test_a_crate_slides_on_a_driven_incline_until_a_spring_holds_it(angle, stiff
     force = stiffness * step.displacement[top, 0].mean()
     weight = 600.0 * 9.81 * 0.2 * 0.12  # a pressure of 1e-5 times Young's modulus, which turns the normals
     np.testing.assert_allclose(force, weight * np.tan(slope + np.arctan(0.4)), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("wrap", "cells", "options"),
+    [(np.pi, 120, {"formulation": "node_to_segment"}), (np.pi, 60, {}), (3.3, 60, {"formulation": "mortar"})],
+)
+def test_a_band_slides_around_half_a_drum_that_holds_it_by_friction(wrap, cells, options):
+    """On springs as stiff as the band, friction has several solutions, and none near equilibrium from other positions."""
+    mesh, turn = fc.generate.block((1.0, 0.5), (cells, 1), "quad8"), 0.5
+    angle, radius = turn + (1.0 - mesh.points[:, 0]) * wrap, 50.0 + mesh.points[:, 1]
+    mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+    slack, tight = np.array([-np.sin(turn + wrap), np.cos(turn + wrap)]), np.array([np.sin(turn), -np.cos(turn)])
+    model = elastic_model(mesh, "plane_strain", E=2e4)
+    model.add_traction("LEFT", **dict(zip("xy", 20.0 * slack, strict=True)))
+    model.prescribe("RIGHT", x=0.3, axes=tuple(tight))
+    drum = fc.obstacles.Sphere((0.0, 0.0), 50.0)
+    model.add_obstacle("drum", secondary="BOTTOM", obstacle=drum, friction=0.3, **options)
+    step = fc.solve(model, 1)[-1]
+    pull = step.reaction.sum(axis=0)
+    assert pull @ tight == pytest.approx(10.0 * np.exp(0.3 * wrap), rel=0.02)  # Euler and Eytelwein
+    np.testing.assert_allclose(step.contact["drum"].force + pull, -10.0 * slack, atol=1e-6)
 
 
 @pytest.mark.parametrize("penalty", [100.0, 0.01])
