@@ -266,7 +266,8 @@ class FloatingBodies:
 
     def with_soft_springs(self, loaded: Loaded, dofs: ActiveDofs, load: Array) -> SoftSprings:
         """Return the prepared matrix `loaded` with soft springs, given the generalised forces `load` (k,) [force]."""
-        return SoftSprings(loaded, self._unknowns(dofs), load, SINGLE_PRECISION * self.stiffness)
+        modes = self._values_at_springs  # in terms of those at the springs
+        return SoftSprings(loaded, self._unknowns(dofs) @ modes, modes.T @ load, SINGLE_PRECISION * self.stiffness)
 
     def _unknowns(self, dofs: ActiveDofs) -> Array:
         """Return the active unknowns (n, k) in the free rigid-body modes."""
