@@ -23,13 +23,13 @@ from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding
+import llvmlite
 import numba
 import numpy as np
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.environment import Environment, lookup_environment
-from numba.core.runtime._nrt_python import c_helpers
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from fastcontact._jit import compiling
@@ -100,7 +100,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Return the compiled kernel of a signature, or None."""
-        _link_runtime()  # Numba's method would first import the compiler (58 modules)
+        rtsys.initialize(target)  # Numba's method would first import the compiler (58 modules)
         data = self.load(self._key(signature, target.codegen()))
         return None if data is None else CompileResult._rebuild(target, *data)
 
@@ -162,16 +162,6 @@ class KernelFiles(_Cache):  # type: ignore[misc]
         settings = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(config)]
         dependencies = "\n".join([*settings, *sorted(set(_dependencies(self._function, set())))])
         return f"{self._name}.{_digest(dependencies.encode())[:24]}"
-
-
-@cache
-def _link_runtime() -> None:
-    """Link kernels with the runtime of Numba, without the functions that Numba compiles in `rtsys.initialize`.
-
-    Only the compiler needs these functions. Their compilation takes longer than loading five kernels.
-    """
-    for name, address in c_helpers.items():
-        llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 # Cache files of kernels, by their Python functions.

@@ -87,10 +87,12 @@ def contact_result(
     if pair.options.kind == "tied":  # normals of the undeformed configuration
         normal = pair.nodal_gap(replace(configuration, displacement=np.zeros_like(configuration.displacement)))[1]
     shear, sticking, tangential = _tangential_results(constraints, solution, rows, normal, closed, scale)
+    finite_normal = np.where(np.isfinite(normal), normal, 0.0)
+    if tangential is not None:
+        shear = _within_cone(constraints, shear, pressure, finite_normal, pair.secondary)
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
         shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
     forces, total, primary_points, primary_forces = _nodal_forces(pair, constraints, multiplier, tangential)
-    finite_normal = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
     place, tangent = middle.distances(constraints.positions), middle.tangent
     along_tangent = place if tangent is None else (constraints.positions - middle.position) @ tangent
@@ -226,9 +228,8 @@ def _closed_nodes(
         never_opening = pair.never_opening(pair.points[pair.secondary.points], configuration)
         closed = closed | (never_opening & np.isfinite(gap))
     closed, pressure = closed_node_pressures(constraints, forces, closed & ~excluded, pair.secondary)
-    raw_pressure = field.pressure(forces) * covered  # averaged at each node like the frictional tractions
-    ratio = np.divide(pressure, raw_pressure, out=np.ones_like(pressure), where=raw_pressure > 0.0)
-    scale = np.where(closed, np.minimum(ratio, 1.0) if raw_pressure.min() < 0.0 else ratio, 0.0)
+    ratio = np.divide(pressure, side_pressure, out=np.ones_like(pressure), where=side_pressure > 0.0)
+    scale = np.where(closed, np.minimum(ratio, 1.0) if side_pressure.min() < 0.0 else ratio, 0.0)
     return closed, pressure, np.where(excluded, 0.0, side_pressure), scale
 
 
@@ -308,8 +309,29 @@ def _nodal_shear(
     forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
     if normal_forces is not None:
         forces += normal_forces[:, None] * normals(directions)
-    traction = field.traction(forces) * np.reshape(field.covered, (-1, 1))
+    traction = field.traction(forces)
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
+
+
+def _within_cone(constraints: Constraints, shear: Array, pressure: Array, normal: Array, side: Surface) -> Array:
+    """Return nodal shear (n, dim) that satisfies Coulomb's law with the nodal pressures (n,) [pressure].
+
+    The constraints satisfy it, but a projection onto nodal values does not preserve inequalities, and the normals of the
+    constraints differ from those of the nodes. As in `closed_node_pressures`, the excess over the limit is moved to the
+    nearest nodes that can carry it, which preserves the resultant.
+    """
+    assert constraints.nodal is not None
+    areas, limit = constraints.nodal.nodal_areas, constraints.friction.max() * np.maximum(pressure, 0.0)
+    receivers = (limit > 0.0) & (areas > NO_AREA * np.abs(areas).mean())
+    while True:
+        size = np.linalg.norm(shear, axis=1)
+        over, receivers = size > (1.0 + SUM_ROUND_OFF) * limit, receivers & (size < limit)
+        within = shear * np.divide(limit, size, out=np.ones_like(size), where=over)[:, None]
+        if not (receivers.any() and over.any()):
+            return within
+        excess = np.where(over[:, None], shear - within, 0.0) * areas[:, None]
+        received = np.column_stack([_received_pressures(receivers, part, areas, side) for part in excess.T])
+        shear = within + received - np.einsum("nd,nd->n", received, normal)[:, None] * normal
 
 
 def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows: slice, result: ContactResult) -> Array:
@@ -322,7 +344,7 @@ def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows:
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))
-    pressure, mean = constraints.nodal.pressure(forces)[:, None], np.zeros_like(result.coordinates)
+    pressure, mean = constraints.nodal.over_whole_side(forces)[:, None], np.zeros_like(result.coordinates)
     np.divide(constraints.nodal.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
     # The nodal values of a field may exceed the values from which it is computed.
     largest, length = np.linalg.norm(slips, axis=1).max(initial=0.0), np.linalg.norm(mean, axis=1)

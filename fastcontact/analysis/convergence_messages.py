@@ -38,7 +38,9 @@ def geometry_not_converged(problem: Problem, history: list[dict[str, Any]], chan
     changes = [entry["displacement_change"] for entry in history]
     decreasing = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
     size = changes[-1] if decreasing else max(changes[-WINDOW:])
-    more = ["more updates (Criteria.max_geometry_updates)"] if decreasing else []
+    # Changes need not decrease while a crack grows through a cohesive layer.
+    layers = [pair for pair in problem.pairs.values() if pair.options.cohesion is not None]
+    more = ["more updates (Criteria.max_geometry_updates)"] if decreasing or layers else []
     advice = [*more, *_advice_for_pairs(problem, last["nodes"])]
     advice.append("a fixed number of updates (Criteria.geometry_updates)")
     if float(f"{size:.0e}") < NOTABLE:  # otherwise `Criteria` refuses it

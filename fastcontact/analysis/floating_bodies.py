@@ -7,8 +7,7 @@ last position.
 
 If the matrix is factorised, the linear response of the contact problem to the position is known, and Newton's method finds
 the position at which the springs are slack. Once the contact state no longer changes, one Newton step suffices, whatever
-the stiffness of the springs. With friction, the first position is that of bodies on springs so soft that their forces are
-negligible, see `SoftSprings`.
+the stiffness of the springs. With friction, the first position is that of bodies on softer springs, see `SoftSprings`.
 
 Otherwise the springs are soft compared with the body, and the new position is that at which they would be slack without
 contact. This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar,
@@ -134,7 +133,7 @@ class PositionResponse:
 
 @dataclass(frozen=True, eq=False)
 class SoftSprings(Loaded):
-    """A prepared matrix with a right-hand side, in which the springs are softer by the factor SINGLE_PRECISION.
+    """A prepared matrix with a right-hand side, in which the springs are softer.
 
     Each spring is in series with a soft one, whose elongation is a rigid-body motion of the bodies.
 
@@ -264,10 +263,14 @@ class FloatingBodies:
         strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(changes, -1, 0)], axis=1)
         return PositionResponse(respond, rigid + strained, strained[springs], springs, changes[0])
 
-    def with_soft_springs(self, loaded: Loaded, dofs: ActiveDofs, load: Array) -> SoftSprings:
-        """Return the prepared matrix `loaded` with soft springs, given the generalised forces `load` (k,) [force]."""
-        modes = self._values_at_springs  # in terms of those at the springs
-        return SoftSprings(loaded, self._unknowns(dofs) @ modes, modes.T @ load, SINGLE_PRECISION * self.stiffness)
+    def with_soft_springs(self, loaded: Loaded, dofs: ActiveDofs, load: Array, slides: bool) -> SoftSprings:
+        """Return the prepared matrix `loaded` with soft springs, given the generalised forces `load` (k,) [force].
+
+        If bodies may slide far, `slides`, the springs are so soft that their forces are negligible.
+        """
+        stiffness = (SINGLE_PRECISION if slides else SOFT) * self.stiffness
+        modes = self._values_at_springs  # in terms of those with springs, which depend on the choice of nodes
+        return SoftSprings(loaded, self._unknowns(dofs) @ modes, modes.T @ load, stiffness)
 
     def _unknowns(self, dofs: ActiveDofs) -> Array:
         """Return the active unknowns (n, k) in the free rigid-body modes."""

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.linalg import LinAlgError
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged, nearest_nodes
@@ -31,14 +32,11 @@ from fastcontact.analysis.tolerances import RESIDUAL, ScatterWindow, Tolerances
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.krylov.minimal_residual import gmres
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
 # Smallest number of pairings after which edges of facets are rounded, because pairings are assumed to alternate.
 UPDATES_BEFORE_ROUNDING = 25
-# Largest number of iterations of GMRES in a Newton step.
-GMRES_ITERATIONS = 20
 # Safety factor for the contraction of changes by the next solution, which is estimated from the last Newton step.
 SAFETY = 3.0
 
@@ -375,12 +373,8 @@ def newton_step(
     changed = (image - before)[where]
     largest_change = largest(changed) or 1.0
     # With the tolerance `accuracy` itself, load steps of plastic bodies take 10 % more pairings.
-    tolerance = max(SINGLE_PRECISION, NOTABLE * accuracy)
-    try:
-        right_side = changed / largest_change
-        v, _ = gmres(lambda v: v - response_along(v)[where], right_side, tolerance, GMRES_ITERATIONS)
-    except LinAlgError:
-        return None
+    system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - response_along(v)[where], dtype=float)
+    v, _ = gmres(system, changed / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
     response_size = largest(largest_change * v - changed)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable, except where layers soften.
     if not response_size <= (largest_change if constraints.branches is None else np.inf):

@@ -297,8 +297,8 @@ def _with_floating_bodies(
     in_increments = isinstance(step.path, Path)
     if constraints.tangents and (position_response is not None or in_increments):
         # With stiff springs, a problem with friction may have several solutions, and none near the position of equilibrium.
-        last_frictional, softened = iterate.frictional, bodies.with_soft_springs(step.loaded, dofs, loads[0])
-        softly_held = solve_at(start, softened)
+        slides, last_frictional = in_increments or not iterate.history, iterate.frictional
+        softly_held = solve_at(start, bodies.with_soft_springs(step.loaded, dofs, loads[0], slides))
         soft_iterations, slip_so_far = softly_held.iterations, softly_held.slip_so_far
         if softly_held.settled:
             start = start + softly_held.u[springs]

@@ -135,7 +135,9 @@ def cohesive_rows(
     intact, jump = damage < 1.0, np.stack([opening, *slips])
     secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(jump), 1))
     compression = max(1.0, COMPRESSION * body_stiffness / law.stiffness) if law.reversible else 1.0
-    secant[0, opening < 0.0] = compression
+    # Otherwise the sign of an opening that is round-off would change the branch of the law.
+    stiffened = (opening < 0.0) & (secant[0] != compression)
+    secant[0, stiffened] = compression
     growing = intact & (damage > (0.0 if law.reversible else before.damage))
     softening = growing & (1.0 - damage > SOFTENING_SLOPE)
     axes, axis = _axes_along(np.where(softening, np.stack([np.maximum(opening, 0.0), *slips]), 0.0))
@@ -164,7 +166,7 @@ def cohesive_rows(
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(jump)),
         compliance=None, tangents=(), directions=(), tied=layer, geometry=lambda *_: Softening(B, correction),
         friction=default, slip0=default, tangential_softness=default, elastic_slip=default, low_rank_compliance=default,
-        branches=np.where(growing, 1 + axis, 0) + 4 * (opening < 0.0) + 8 * ~intact,
+        branches=np.where(growing, 1 + axis, 0) + 4 * stiffened + 8 * ~intact,
     ).without(np.concatenate([zeros > 0.0, *[~intact] * len(slip0)]))  # fmt: skip
 
 

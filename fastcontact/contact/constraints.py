@@ -61,8 +61,8 @@ class NodalField(Protocol):
         """
 
     def traction(self, force: Array) -> Array:
-        """Return nodal tractions (n_nodes, dim) per unit reference area [pressure] for forces (m, dim) [force]."""
-        return np.column_stack([self.pressure(component) for component in force.T])
+        """Return nodal tractions (n_nodes, dim) [pressure] for forces (m, dim) [force], like `over_whole_side`."""
+        return np.column_stack([self.over_whole_side(component) for component in force.T])
 
     def over_whole_side(self, force: Array) -> Array:
         """Return nodal pressures (n_nodes,) [pressure] per unit of the complete area of each node.

@@ -188,7 +188,11 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
         return motions
     without_body = bodies(mesh)[1][relations.indices // mesh.dim] < 0
     points = np.unique(relations.indices[without_body & ~fixed.ravel()[relations.indices]])
-    labels = [Label(f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}") for dof in points]
+    names = {int(members[0]): f"'{name}'" for name, members in mesh.point_groups.items() if len(members) == 1}
+    labels = [
+        Label(f"point {names.get(int(dof) // mesh.dim, dof // mesh.dim)}", f"translation along {'xyz'[dof % mesh.dim]}")
+        for dof in points
+    ]
     motions = motions.with_translations(points, labels, mesh.points.size)
     if not relations.shape[0] or not len(motions):
         return motions

@@ -95,8 +95,11 @@ def test_mixed_modes_take_the_energy_of_benzeggagh_and_kenane(angle):
 
 
 @pytest.mark.filterwarnings("ignore:.*in steps of|.*bends")
+@pytest.mark.parametrize(
+    ("law", "deviation"), [({"strength": 10.0}, 0.01), ({"strength": 30.0, "stiffness": 1e6}, 0.03)]
+)
 @pytest.mark.parametrize("options", [{}, *(pytest.param(own, marks=pytest.mark.slow) for own in FORMULATIONS[1:])])
-def test_a_double_cantilever_beam_follows_beam_theory(options):
+def test_a_double_cantilever_beam_follows_beam_theory(options, law, deviation):
     """P = sqrt(G E I) / l and d = 2 P l^3 / (3 E I), per width, once the crack runs (Williams, 1989); elastic before."""
     n, h, a, E, G = 70, 1.5, 30.0, 120e3, 0.26
     upper, lower = (fc.generate.block((70.0, h), (n, 1), "quad8", (0.0, y), name="BEAM") for y in (0.0, -h))
@@ -106,12 +109,13 @@ def test_a_double_cantilever_beam_follows_beam_theory(options):
     supported(model, **{"UP TOP_LEFT": {"y": 2.0}, "LOW BOTTOM_LEFT": {"y": -2.0}})
     for corner in ("UP BOTTOM_RIGHT", "LOW TOP_RIGHT"):
         model.fix(corner, "xy")
-    model.add_contact("glue", secondary="GLUE", primary="LOW TOP", cohesion={"strength": 10.0, "energy": G}, **options)
+    model.add_contact("glue", secondary="GLUE", primary="LOW TOP", cohesion={"energy": G, **law}, **options)
     steps = fc.solve(model, 5, criteria=fc.Criteria(max_geometry_updates=100))
+    assert sum(step.iterations["geometry_updates"] for step in steps) < 200  # 353 if round-off of openings mattered
     pull = [step.reaction[mesh.points_of("UP TOP_LEFT"), 1].sum() for step in steps]
     inertia, opened = h**3 / 12.0, 4.0
     length = np.sqrt(1.5 * E * inertia * opened / np.sqrt(G * E * inertia))
-    assert abs(pull[-1] / (np.sqrt(G * E * inertia) / length) - 1.0) < 0.01
+    assert abs(pull[-1] / (np.sqrt(G * E * inertia) / length) - 1.0) < deviation
     released = steps[-1].work["energy_released"]
     contact = steps[-1].contact["glue"]
     broken = contact.coordinates[contact.damage >= 1.0, 0].max() - a

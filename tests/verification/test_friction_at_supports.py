@@ -8,6 +8,7 @@ from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.analysis.convergence_messages import friction_exceeded
+from fastcontact.analysis.floating_bodies import FloatingBodies
 
 pytestmark = pytest.mark.each_value
 
@@ -122,9 +123,9 @@ def test_a_block_within_the_cone_is_held_whatever_the_direction_of_its_load(azim
     assert force == pytest.approx(0.25 * np.array([*-along, 1.0]), abs=1e-8)
 
 
-def pushed(push):
+def pushed(push, element="hex8", divisions=2):
     """A cube on a floor, with a coefficient of friction of 0.3, under a unit pressure and a tangential force."""
-    model = elastic_model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), "hex8"), "3d")
+    model = elastic_model(fc.generate.box((1.0, 1.0, 1.0), (divisions,) * 3, element), "3d")
     model.add_pressure("ZMAX", 1.0, ramp=[(0, 0), (1, 1), (2, 1)])
     model.add_traction("XMIN", x=push, ramp=[(0, 0), (1, 0), (2, 1)])
     floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
@@ -139,9 +140,19 @@ def test_a_push_beyond_friction_is_told_as_such(push, needed):
         fc.solve(pushed(push), [1.0, 2.0])
 
 
-def test_a_push_just_below_the_friction_limit_converges():
-    floor = fc.solve(pushed(0.2999), [1.0, 2.0])[-1].contact["floor"]
-    assert floor.force == pytest.approx([-0.2999, 0.0, 1.0], abs=1e-9)
+@pytest.mark.parametrize(("push", "element", "divisions"), [(0.2999, "hex8", 2), (0.299999, "hex20", 3)])
+def test_a_push_just_below_the_friction_limit_takes_few_positions(push, element, divisions, monkeypatch):
+    """Newton's method for the anchors converges, even where it moves the body by up to its slip."""
+    positions, settle = [], FloatingBodies.settle
+
+    def counted(*arguments):
+        positions.append((rigid := settle(*arguments)).positions)
+        return rigid
+
+    monkeypatch.setattr(FloatingBodies, "settle", counted)
+    step = fc.solve(pushed(push, element, divisions), [1.0, 2.0])[-1]
+    assert step.contact["floor"].force == pytest.approx([-push, 0.0, 1.0], abs=1e-9)
+    assert sum(positions) <= 24
 
 
 def test_friction_that_would_hold_rigid_bodies_is_told_as_such():

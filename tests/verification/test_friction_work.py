@@ -165,7 +165,11 @@ def test_works_add_up_however_few_the_steps(formulation, penalty):
     for count in (1, 5):
         mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 9.0), segments=3)
         model = pressed_spheres(mesh, formulation=formulation, penalty=penalty)
-        found.append(fc.solve(model, count)[-1].work)
+        steps = fc.solve(model, count)
+        found.append(steps[-1].work)
+    forces, moved = ([0.0, *(getattr(step, name) for step in steps)] for name in ("reaction", "displacement"))
+    work = sum(0.5 * ((p + q) * (v - u)).sum() for p, q, u, v in zip(forces, forces[1:], moved, moved[1:]))
+    assert found[1]["external_work"] == pytest.approx(work, rel=0.02)  # that of the supports
     for told in found:
         assert told["external_work"] == pytest.approx(told["strain_energy"] + told["penalty_energy"], rel=2e-3)
         assert told["friction_work"] == 0.0
@@ -208,6 +212,18 @@ def pressed_ball(solver="auto", steps=5, friction_while_touching=0.01, **changes
     """Press the ball; return the steps."""
     criteria = fc.Criteria(friction_while_touching=friction_while_touching)
     return fc.solve(ball_on_block(**changes), steps, criteria=criteria, linear_solver=solver)
+
+
+@pytest.mark.parametrize("formulation", ["continuous", "mortar"])
+def test_nodal_tractions_obey_coulomb_and_have_the_resultant_of_the_forces(formulation):
+    contact = fc.solve(ball_on_block("plane_strain", "quad8", formulation=formulation), 3)[-1].contact["ball"]
+    shear = np.linalg.norm(contact.shear, axis=1)
+    assert (shear <= 0.3 * contact.pressure * (1.0 + 1e-9)).all()
+    order = np.argsort(contact.abscissa)
+    traction = (contact.shear + contact.pressure[:, None] * np.nan_to_num(contact.normal))[order]
+    length = np.diff(contact.coordinates[order[::2], 0])[:, None] / 6.0
+    total = (length * (traction[:-2:2] + 4.0 * traction[1::2] + traction[2::2])).sum(axis=0)
+    assert total == pytest.approx(contact.force, rel=0.015)
 
 
 @pytest.mark.each_value

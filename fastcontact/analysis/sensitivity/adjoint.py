@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.arrays import Array, largest
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.krylov.minimal_residual import gmres
 from fastcontact.linear.protocol import TOLERANCE
 
 # Largest number of GMRES iterations for s, each with one linear solution.
@@ -134,8 +134,10 @@ class Adjoint:
         def product(s: Array) -> Array:
             return s + self._transposed(*self._solve_transposed(s, zero))
 
-        s, converged = gmres(product, pairing_terms, TOLERANCE, SOLUTIONS)
-        if not converged:
+        n = len(right_side)
+        operator = LinearOperator((n, n), product)
+        s, info = gmres(operator, pairing_terms, rtol=TOLERANCE, atol=0.0, restart=SOLUTIONS, maxiter=1)
+        if info:
             raise ConvergenceError(
                 f"the adjoint equations of the moving contact geometry do not converge in {self.solutions} solutions: "
                 "keep the pairing (Criteria(keep_pairing=True)), or use finite differences of two solutions"

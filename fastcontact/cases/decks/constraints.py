@@ -15,10 +15,10 @@ from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, refusing, unquoted
 from fastcontact.cases.decks.content import Content, Coupling, Equation, MultiPoint, Pair, SectorEnds
-from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
+from fastcontact.cases.decks.meshing import DeckMesh, ascending, group_of_surface
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import ROTATION, Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
 
 # Smallest number of nodes of those kinds of *MPC whose number of nodes is not fixed.
@@ -28,7 +28,7 @@ FLAT = 1e-9
 
 
 def add_rotation_points(deck_mesh: DeckMesh) -> None:
-    """Add a point for the rotation of each reference node, before the mesh is built.
+    """Add a point for the rotation of each reference node, and groups for both, before the mesh is built.
 
     Raises CaseError in axisymmetric models.
     """
@@ -40,6 +40,8 @@ def add_rotation_points(deck_mesh: DeckMesh) -> None:
             raise coupling.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
         else:
             deck_mesh.rotation(point)
+        name = deck_mesh.add_points(coupling.reference, [point])
+        deck_mesh.point_groups[name + ROTATION] = ascending([deck_mesh.rotations[point]])
 
 
 def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:

@@ -24,6 +24,7 @@ from fastcontact.cases.decks.keywords import read_content
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
+from fastcontact.mesh.mesh import ROTATION
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult, Steps
@@ -162,16 +163,25 @@ class Deck:
         step = replace(step, displacement=displacement)
         if self.building.content.steps and step.load_factor == self.ramp.instants[-1]:
             self._warn_of_large_strains(step)
-        t = self.thickness
+        t, mesh = self.thickness, self.model.mesh
+        references = {
+            name: {
+                "force": (t * reaction[mesh.point(name)]).tolist(),
+                "moment": (t * reaction[mesh.point(name + ROTATION), : 2 * mesh.dim - 3]).tolist(),
+            }
+            for name in mesh.point_groups
+            if name + ROTATION in mesh.point_groups
+        }
+        iterations = step.iterations | ({"reference_reactions": references} if references else {})
         if t == 1.0:
-            return replace(step, reaction=reaction)
+            return replace(step, reaction=reaction, iterations=iterations)
         contacts = {
             name: replace(contact, **{key: t * getattr(contact, key) for key in EXTENSIVE_FIELDS})
             for name, contact in step.contact.items()
         }
         sums = {name: _scaled(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
         heat = None if step.heat_reaction is None else t * step.heat_reaction
-        iterations = step.iterations | sums
+        iterations |= sums
         return replace(step, reaction=t * reaction, contact=contacts, iterations=iterations, heat_reaction=heat)
 
     def _support_reactions(self, reaction: Array, instant: float) -> Array:

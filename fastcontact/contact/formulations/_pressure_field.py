@@ -124,9 +124,9 @@ class PressureField(NodalField):
     def traction(self, force: Array) -> Array:
         """Return nodal tractions (n_nodes, dim) for point forces (m, dim); see `NodalField`."""
         if self.axes is None:
-            return self.pressure(force)
+            return super().traction(force)
         at_points, at_nodes = self.axes
-        return np.einsum("nde,ne->nd", at_nodes, self.pressure(np.einsum("mde,md->me", at_points, force)))
+        return np.einsum("nde,ne->nd", at_nodes, super().traction(np.einsum("mde,md->me", at_points, force)))
 
     @property
     def covered(self) -> Array:

@@ -1,1 +1,1 @@
-"""Krylov methods preconditioned by a multigrid cycle."""
+"""Krylov methods: those preconditioned by a multigrid cycle, and GMRES for small systems."""

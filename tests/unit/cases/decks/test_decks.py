@@ -261,6 +261,10 @@ def test_a_rigid_body_turns_by_a_moment_at_its_reference_node_or_rotation_node(t
     assert moment == pytest.approx(0.1, rel=1e-3)
     assert step.reaction[deck.points_of("bottom")].sum(axis=0)[2] == pytest.approx(1.0)
     assert abs(step.reaction[deck.point(90), 2]) < 1e-9
+    (reference,) = step.reference_reactions.values()
+    assert list(step.reference_reactions) == ["ref"]
+    assert reference["force"] == step.reaction[deck.point(90)].tolist()
+    assert reference["moment"][1] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["Kinematic", "Distributing"])
@@ -274,6 +278,7 @@ def test_forces_and_moments_at_a_coupling_reach_the_floor(tmp_path, kind):
     bottom = deck.points_of("bottom")
     force = step.reaction[bottom, 2]
     assert force.sum() == pytest.approx(100.0)
+    assert list(step.reference_reactions) == ["90"]
     # The force acts at x = 0.7; the moment 5 about y moves its line by 0.05.
     x = deck.model.mesh.points[bottom, 0]
     sides = step.reaction[deck.points_of("x0"), 0] @ deck.model.mesh.points[deck.points_of("x0"), 2]
