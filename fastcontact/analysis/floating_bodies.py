@@ -283,7 +283,8 @@ class FloatingBodies:
         Its keys are ``motions``, the free motions of bodies; ``springs``, the components to which springs are
         attached; ``spring_stiffness`` [force / length]; ``force_left``, the remaining force of each spring [force];
         ``relative_to_load``, the largest of these forces divided by `load` [-]; and ``positions``, the number of positions.
-        The load step adds ``undetermined``, the result of the method of this name.
+        The load step adds ``undetermined``, the names of the motions that the method of this name returns, by body, and
+        ``moved``, the largest displacement of these bodies in the step [length].
         """
         remaining = np.abs(rigid.spring_force)
         return {
@@ -297,8 +298,8 @@ class FloatingBodies:
 
     def undetermined(
         self, constraints: Constraints, multiplier: Array, u: Array, load: float, residual: float
-    ) -> dict[str, list[str]]:
-        """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step, by body.
+    ) -> FreeMotions:
+        """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step.
 
         Any position without contact forces is then a solution. Contact forces of sides that just touch are round-off and are
         ignored. Such forces are negligible compared with the force of a spring that is elongated by the largest
@@ -325,7 +326,7 @@ class FloatingBodies:
         restraints = [constraints.B[loaded], *(tangent[frictional] for tangent in constraints.tangents)]
         _, values, V = np.linalg.svd(np.vstack([rows @ self.motions.displacement for rows in restraints]))
         free = np.append(values, np.zeros(len(V) - len(values))) <= SINGLE_PRECISION
-        return self.motions.combined(V[free].T).by_body() if free.any() else {}
+        return self.motions.combined(V[free].T)
 
     def moving(self, rigid: RigidPosition) -> list[str]:
         """Return the motions of bodies in the free rigid-body modes with the largest generalised forces of the springs."""

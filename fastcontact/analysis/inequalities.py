@@ -256,7 +256,9 @@ def _with_floating_bodies(
     def solve_at(anchor: Array, loaded: Loaded = step.loaded) -> Solution:
         nonlocal last_active, guess
         shifted_lift = lift + bodies.rigid(anchor)
-        solution = _solve(replace(step, loaded=loaded), constraints, iterate, last_active, accuracy, shifted_lift, guess)
+        solution = _solve(
+            replace(step, loaded=loaded), constraints, iterate, last_active, accuracy, shifted_lift, guess
+        )
         last_active, guess = solution.wanted, guess.copy()
         guess[dofs.active] = dofs.displacement(solution.u, shifted_lift)
         return solution
