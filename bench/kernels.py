@@ -116,7 +116,7 @@ def recorder(kernels: list[list[Any]], work: Counter[int]) -> Callable[..., Any]
             if not active and None not in kernel[2]:
                 if kernel not in kernels:
                     kernels.append(kernel)
-                work[kernels.index(kernel)] += int(min(interpreting.entries(arguments), 1e9))
+                work[kernels.index(kernel)] += int(min(interpreting.n_entries(arguments), 1e9))
             active.append(function.__name__)
             try:
                 return function(*arguments)
@@ -130,7 +130,7 @@ def recorder(kernels: list[list[Any]], work: Counter[int]) -> Callable[..., Any]
 
 def is_interpretable(module: str, name: str) -> bool:
     """Return whether Python may run a kernel while it is not compiled."""
-    return isinstance(getattr(importlib.import_module(module), name), interpreting.Interpretable)
+    return isinstance(getattr(importlib.import_module(module), name), interpreting.InterpretableKernel)
 
 
 def kernels_of_model(number: int) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def linear_solution(problem: Problem, tolerance: float) -> dict[str, Any]:
     solver = problem.solver
     solver.tolerance = tolerance
     lift = problem.load_at(1.0).lift
-    loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
+    loaded = solver.load(problem.system.right_side(np.zeros_like(lift), lift))
     none = csr_array((0, len(lift))), np.empty(0)
     for _ in range(2):
         before = solver.counters.iterations
@@ -119,7 +119,7 @@ def pyamg_solution(problem: Problem) -> dict[str, Any]:
     K, modes = problem.solver.K.restored(), problem.system.unknowns_of(near_nullspace(problem.model))
     with threadpool_limits(1):
         _, setup, _ = timed(lambda: solver.prepare(K, modes))
-        loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
+        loaded = solver.load(problem.system.right_side(np.zeros_like(lift), lift))
         _, cpu, wall = timed(lambda: loaded.solve(csr_array((0, len(lift))), np.empty(0)))
     return {"setup_cpu_s": setup, "cpu_s": cpu, "wall_s": wall, "iterations": solver.counters.iterations}
 
@@ -194,7 +194,7 @@ def measure(name: str, dofs: int, count: int, with_pyamg: bool) -> dict[str, Any
         lift = problem.load_at(1.0).lift
         B, gap0 = problem.system.rows(rows.B, rows.gap0, lift)
         use = np.flatnonzero(np.diff(B.indptr) > 0)
-        loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
+        loaded = solver.load(problem.system.right_side(np.zeros_like(lift), lift))
         for _ in range(2):
             before = solver.counters.iterations
             _, cpu, _ = timed(lambda: loaded.solve(B[use], -gap0[use]))

@@ -16,7 +16,7 @@ Numbers: TypeAlias = NDArray[np.int32]
 AnyArray: TypeAlias = NDArray[Any]
 
 # End of the error message about an argument with masked entries.
-REFUSAL = "has masked entries, which are not supported: fill or remove them"
+MASKED_ENTRIES = "has masked entries, which are not supported: fill or remove them"
 
 
 def largest(x: Array) -> float:

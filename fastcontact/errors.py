@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-LONGEST = 1500  # largest number of characters of a message
+MAX_LENGTH = 1500  # largest number of characters of a message
 # NumPy scalars in the representation of a list, dictionary or other object, such as np.float64(0.5) and np.True_.
 NUMPY_SCALAR = re.compile(r"\bnp\.(?:(?:float|int|uint|complex|str)\d*_?\(([^()]*)\)|(True|False)_)")
 
@@ -30,7 +30,7 @@ class FastcontactError(Exception):
     def __str__(self) -> str:
         # Names and values from files may contain newlines, control characters and thousands of characters.
         text = printable(" ".join(super().__str__().splitlines()))
-        return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 3 :]}"
+        return text if len(text) <= MAX_LENGTH else f"{text[: MAX_LENGTH // 2]} ... {text[-MAX_LENGTH // 3 :]}"
 
 
 class MeshError(FastcontactError):
@@ -102,8 +102,8 @@ def warn(text: str) -> None:
     warnings.warn(text, FastcontactWarning, stacklevel=level)
 
 
-LONGEST_NAME = 120  # largest number of characters of an unknown name in a message
-MAX_SHOWN = 20  # largest number of known names in the message about an unknown one
+MAX_NAME_LENGTH = 120  # largest number of characters of an unknown name in a message
+MAX_LISTED = 20  # largest number of known names in the message about an unknown one
 # Smallest similarity ratio (difflib) of a name that is suggested; that of "loads" and "nodes" is 0.6.
 SIMILARITY = 0.65
 # Words that users may know from other programs or from other parts of fastcontact, with the corresponding names in
@@ -140,19 +140,19 @@ def nearest(name: str, known: Collection[str]) -> list[str]:
     """
     prefix = name[: name.rfind(".") + 1]
     start = len(prefix) if all(candidate.startswith(prefix) for candidate in known) else 0
-    exact = {candidate[start:].lstrip("-"): candidate for candidate in reversed([*known])}
-    folded = {key.casefold(): candidate for key, candidate in exact.items()}
+    by_key = {candidate[start:].lstrip("-"): candidate for candidate in reversed([*known])}
+    folded = {key.casefold(): candidate for key, candidate in by_key.items()}
     name = name[start:].lstrip("-")
     synonyms = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
     without_underscores = {key.replace("_", ""): candidate for key, candidate in reversed(folded.items())}
     similar = [candidate for key, candidate in without_underscores.items() if key.rpartition(".")[2] in synonyms]
-    similar = similar or [exact[key] for key in difflib.get_close_matches(name, exact, n=3, cutoff=SIMILARITY)]
+    similar = similar or [by_key[key] for key in difflib.get_close_matches(name, by_key, n=3, cutoff=SIMILARITY)]
     name = name.casefold()
     similar = similar or [folded[key] for key in difflib.get_close_matches(name, folded, n=3, cutoff=SIMILARITY)]
     return similar or [folded[key] for key in reversed(folded) if len(name) > 2 and name in key][:3]
 
 
-def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
+def attribute_error(owner: str, name: str, known: Collection[str]) -> AttributeError:
     """Return the AttributeError for a missing attribute, with similar known names; `owner` is a text like "module 'x'"."""
     text = f"{owner} has no attribute '{name}'"
     public = {"fastcontact": "fastcontact", "fastcontact.mesh.generate": "fastcontact.generate"}
@@ -164,8 +164,8 @@ def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeErro
     return AttributeError(text, name=name)  # without `obj`, Python adds no suggestion
 
 
-class Suggesting:
-    """Base class of objects that suggest similar names in the AttributeError for a missing attribute."""
+class NameSuggestions:
+    """Base class of objects whose AttributeError for a missing attribute suggests similar names."""
 
     if not TYPE_CHECKING:  # hidden from type checkers, which report unknown names themselves
 
@@ -175,14 +175,14 @@ class Suggesting:
             if name.startswith("_") or hasattr(type(self), name):
                 return object.__getattribute__(self, name)
             public = [attribute for attribute in dir(self) if not attribute.startswith("_")]
-            raise no_attribute(f"'{type(self).__name__}' object", name, public)
+            raise attribute_error(f"'{type(self).__name__}' object", name, public)
 
 
 def getattr_and_dir(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """Return ``__getattr__`` and ``__dir__`` for the module called `module` with the public names `known`."""
 
     def attribute(name: str) -> object:
-        raise AttributeError(name) if name.startswith("_") else no_attribute(f"module '{module}'", name, known)
+        raise AttributeError(name) if name.startswith("_") else attribute_error(f"module '{module}'", name, known)
 
     return attribute, lambda: known
 
@@ -198,10 +198,10 @@ def check_known(
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the message about an unknown name, with similar known names or, if there are none, the first known names."""
     names, name = sorted(known), str(name)
-    name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+    name = name if len(name) <= MAX_NAME_LENGTH else f"{name[:MAX_NAME_LENGTH]}..."
     if not names:
         return f"unknown {kind} '{name}': none is defined"
     if similar := nearest(name, names):
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in similar) + "?"
-    listed = ", ".join(names[:MAX_SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > MAX_SHOWN else "")
+    listed = ", ".join(names[:MAX_LISTED]) + (f", ... ({len(names)} in all)" if len(names) > MAX_LISTED else "")
     return f"unknown {kind} '{name}': expected one of {listed}"

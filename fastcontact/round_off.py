@@ -15,6 +15,6 @@ SINGLE_PRECISION = 1e-6
 SUM_ROUND_OFF = 16 * float(np.finfo(float).eps)
 # Step of central differences, relative to the magnitude of the argument, for which truncation and round-off errors are of the
 # same order.
-DIFFERENCES = float(np.finfo(float).eps) ** (1.0 / 3.0)
+DIFFERENCE_STEP = float(np.finfo(float).eps) ** (1.0 / 3.0)
 # Lower bound of divisors that may vanish.
 TINY = 1e-300

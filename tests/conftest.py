@@ -29,7 +29,7 @@ from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
 model = fc.Model(fc.generate.block(), "plane_strain", strain="finite")
 model.add_material(fc.NeoHookean(E=1.0, nu=0.3))
 bodies = NonlinearBodies(model.mesh, "plane_strain", "finite", model.material_field())
-bodies.at(0.0 * model.mesh.points, bodies.beginning)
+bodies.at(0.0 * model.mesh.points, bodies.initial_history)
 """
 
 # The same examples in every run, so that no change fails by chance; `--hypothesis-profile=long` looks further.
@@ -62,7 +62,7 @@ def prepare_workers(whole: bool) -> None:
     """Give each worker one processor; where all tests run on an empty cache, compile kernels that all workers need."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     folder = cache.cache_folder()
-    if whole and folder and decorators.compiled() and not any(folder.glob("*.nbc")):
+    if whole and folder and decorators.jit_enabled() and not any(folder.glob("*.nbc")):
         nonlinear = subprocess.Popen([sys.executable, "-c", NONLINEAR], cwd=ROOT)
         atexit.register(nonlinear.kill)
         for process in (*ahead.start((), decorators.threads()), nonlinear):

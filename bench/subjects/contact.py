@@ -101,7 +101,7 @@ def matrix_of(problem):
 def prepared(problem, solver, matrix):
     modes = problem.system.unknowns_of(near_nullspace(problem.model))
     release = matrix is not problem.system.matrix
-    solver.prepare(matrix, modes, problem.system.involved(problem.contact_dofs), release)
+    solver.prepare(matrix, modes, problem.system.involved_unknowns(problem.contact_dofs), release)
     return solver
 
 
@@ -117,7 +117,7 @@ def started(model, name, count, tolerance=TOLERANCE):
 
 def linear_solution(problem, solver):
     lift = problem.load_at(1.0).lift
-    loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
+    loaded = solver.load(problem.system.right_side(np.zeros_like(lift), lift))
     before = solver.counters.iterations
     loaded.solve(csr_array((0, len(lift))), np.empty(0))
     return solver.counters.iterations - before

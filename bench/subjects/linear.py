@@ -19,7 +19,7 @@ def works(size):
     problem = prepare(model, fc.linear_ramp(), Criteria(), linear_solver="amg", linear_tolerance=1e-8)
     K, modes = problem.system.matrix.restored(), problem.system.unknowns_of(near_nullspace(model))
     lift = problem.load_at(1.0).lift
-    right = problem.system.right(np.zeros_like(lift), lift)
+    right = problem.system.right_side(np.zeros_like(lift), lift)
 
     def solution(name):
         solver = linear.make(name, dim=3, n_dofs=model.n_dofs, tolerance=1e-8)

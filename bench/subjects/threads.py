@@ -92,7 +92,7 @@ def bandwidths(solver, size):
     found = {"read_rate": size / _fastest(lambda: iteration.dot(long, long))}
     A, n = solver.hierarchy.levels[0].A, solver.hierarchy.n
     where = sum(part.nbytes for part in (A.storage[:3] if A.storage[3] else (A.indptr, A.indices)))
-    for name, matrix, parts in (("single", A, (A.data,)), ("exact", solver.K.scaled, solver.K.scaled.exact)):
+    for name, matrix, parts in (("single", A, (A.data,)), ("exact", solver.K.scaled, solver.K.scaled.exact_data)):
         x, y = np.ones((2, n), A.data.dtype if name == "single" else float)
         seconds = _fastest(lambda matrix=matrix, x=x, y=y: matrix.multiply(x, y))
         read = sum(part.nbytes for part in parts) + where + x.nbytes + y.nbytes

@@ -33,7 +33,7 @@ def linear_solution(model: fc.Model, solver: str, **tolerances: float) -> int:
     """Assemble, prepare and solve a model without its contact; return the iterations."""
     problem = started(without_contact(model), solver, **tolerances)
     load = problem.load_at(1.0)
-    right = problem.system.right(np.zeros_like(load.lift), load.lift)
+    right = problem.system.right_side(np.zeros_like(load.lift), load.lift)
     problem.solver.load(right).full_solution(np.zeros_like(load.lift))
     return problem.solver.counters.iterations
 

@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # Largest number of helpers of a run. Each helper needs the memory of a Python process with Numba.
 MAX_HELPERS = 3
 # Largest number of kernels that the run compiles without helpers, because starting helpers would take longer.
-MAX_UNHELPED = 2
+MAX_WITHOUT_HELPERS = 2
 # Kinds of runs for which this process has already started helpers, so that later runs need none.
 _runs_with_helpers: set[str] = set()
 
@@ -44,7 +44,8 @@ _runs_with_helpers: set[str] = set()
 def table() -> dict[str, Any]:
     """Return the table ``{"kernels": [[module, name, [type, ...]], ...], "runs": {name: [[number, ...], [number, ...]]}}``.
 
-    The two lists of a run contain the numbers of the kernels that must be compiled and of those that may run in Python.
+    The number of a kernel is its index in the first list. The two lists of a run contain the numbers of the kernels that must
+    be compiled and of those that may run in Python.
     """
     content: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
     return content
@@ -66,7 +67,7 @@ def kernel_numbers(runs: Sequence[str]) -> list[int]:
 def numba_type(entry: Any) -> Any:
     """Return the Numba type of an entry of the table.
 
-    A string is a scalar in NumPy's notation of kind and size in bytes. A list ``[scalar, dimensions]`` is a contiguous array,
+    A string is a scalar in NumPy's notation, such as "f8". A list ``[scalar, dimensions]`` is a contiguous array,
     and ``[scalar, dimensions, "r"]`` is a read-only array. ``{"class": [type, ...]}`` is a named tuple, or a plain tuple if
     the name of the class is empty.
     """
@@ -106,26 +107,26 @@ def _file_name(number: int) -> str:
 
 
 def start(
-    runs: Sequence[str], helpers: int, output: int = subprocess.PIPE, errors: int = subprocess.DEVNULL
+    runs: Sequence[str], n_helpers: int, output: int = subprocess.PIPE, errors: int = subprocess.DEVNULL
 ) -> list[subprocess.Popen[str]]:
     """Start helper processes that share the compilation of the kernels of the given kinds of runs.
 
     Each helper writes the numbers of the kernels that it begins to `output`, and the reasons for failures to `errors`.
     """
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    command = [sys.executable, "-m", __name__, str(helpers)]
+    command = [sys.executable, "-m", __name__, str(n_helpers)]
     started = [
         subprocess.Popen(
             [*command, str(first), *runs], stdin=subprocess.PIPE, stdout=output, stderr=errors, text=True,
             env={**os.environ, "PYTHONPATH": path},
         )
-        for first in range(helpers)
+        for first in range(n_helpers)
     ]  # fmt: skip
-    atexit.register(_end, started)
+    atexit.register(_terminate, started)
     return started
 
 
-def _end(processes: list[subprocess.Popen[str]]) -> None:
+def _terminate(processes: list[subprocess.Popen[str]]) -> None:
     """Terminate helpers that are still running. The files of the kernels that they have compiled are complete."""
     for process in processes:
         process.terminate()
@@ -144,7 +145,7 @@ class Helpers:
     """
 
     def __init__(self, runs: Sequence[str], processes: list[subprocess.Popen[str]]) -> None:
-        self._processes, self._not_begun, self._needed = processes, kernel_numbers(runs), required_kernels(runs)
+        self._processes, self._not_begun, self._required = processes, kernel_numbers(runs), required_kernels(runs)
         self._current: dict[int, int] = {}  # kernel being compiled by each helper
         self._changed = threading.Condition()
         for number in range(len(processes)):
@@ -163,7 +164,7 @@ class Helpers:
             self._current.pop(helper, None)
             if kernel is not None:
                 self._current[helper] = kernel
-                self._not_begun = [other for other in self._not_begun if other != kernel]
+                self._not_begun = [number for number in self._not_begun if number != kernel]
             self._changed.notify_all()
 
     def wait(self, name: str) -> bool:
@@ -187,7 +188,7 @@ class Helpers:
 
     def _compile_next(self) -> bool:
         """Compile a required kernel that no helper has begun; return whether there was one."""
-        numbers = [number for number in self._not_begun if number in self._needed][:1]
+        numbers = [number for number in self._not_begun if number in self._required][:1]
         self._claim(numbers)
         for number in numbers:
             compile_kernel(number)
@@ -202,28 +203,29 @@ class Helpers:
                 print(number, file=process.stdin, flush=True)
 
 
-def expect(runs: Sequence[str]) -> None:
-    """Start helpers for the given kinds of runs as soon as more than MAX_UNHELPED kernels were found to be uncompiled.
+def request_helpers(runs: Sequence[str]) -> None:
+    """Start helpers for the given kinds of runs as soon as more than MAX_WITHOUT_HELPERS kernels have to be compiled.
 
     Helpers are started only if one of the missing kernels cannot run in Python. There are no helpers in worker processes,
     with a single thread, without a kernel cache, or if the interpreter is embedded in another program.
     """
-    new, helpers = [run for run in runs if run not in _runs_with_helpers], min(decorators.threads() - 1, MAX_HELPERS)
+    new_runs = [run for run in runs if run not in _runs_with_helpers]
+    n_helpers = min(decorators.threads() - 1, MAX_HELPERS)
     is_python = Path(sys.executable or "").stem.startswith("python")
-    if not new or helpers < 1 or compiling.in_worker() or not is_python or not kernel_files.files:
+    if not new_runs or n_helpers < 1 or compiling.in_worker() or not is_python or not kernel_files.files:
         return
 
-    def begin() -> None:
-        if compiling.count > MAX_UNHELPED and begin in compiling.helper_requests:
-            compiling.helper_requests.remove(begin)
-            _runs_with_helpers.update(new)
-            if all(map(_is_cached, required_kernels(new))):  # the other kernels may run in Python
+    def start_helpers() -> None:
+        if compiling.count > MAX_WITHOUT_HELPERS and start_helpers in compiling.helper_requests:
+            compiling.helper_requests.remove(start_helpers)
+            _runs_with_helpers.update(new_runs)
+            if all(map(_is_cached, required_kernels(new_runs))):  # the other kernels may run in Python
                 return
             with contextlib.suppress(OSError):  # without helpers, the run compiles all kernels
-                compiling.waiters.append(Helpers(new, start(new, helpers)).wait)
+                compiling.waiters.append(Helpers(new_runs, start(new_runs, n_helpers)).wait)
 
-    compiling.helper_requests[:] = [begin]
-    begin()
+    compiling.helper_requests[:] = [start_helpers]
+    start_helpers()
 
 
 def main(arguments: Sequence[str]) -> int:

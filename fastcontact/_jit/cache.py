@@ -37,11 +37,11 @@ from fastcontact._version import __version__
 
 log = logging.getLogger("fastcontact")
 # Settings of Numba that affect compiled code but not the keys of its cache.
-OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
+NUMBA_SETTINGS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
 # Number of characters of a digest.
 DIGEST_LENGTH = 64
 # Types of global variables that are compiled into kernels as constants.
-CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
+CONSTANT_TYPES = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
 
 
 class _Unpickler(pickle.Unpickler):
@@ -157,8 +157,8 @@ class KernelFiles(_Cache):  # type: ignore[misc]
 
     @cached_property
     def version(self) -> str:
-        """Name of the kernel with a digest of all that determines its machine code, apart from signature and processor."""
-        config = {name: getattr(numba.config, name, None) for name in OPTIONS}
+        """Name of the kernel with a digest of what determines its machine code besides the signature and the processor."""
+        config = {name: getattr(numba.config, name, None) for name in NUMBA_SETTINGS}
         settings = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(config)]
         dependencies = "\n".join([*settings, *sorted(set(_dependencies(self._function, set())))])
         return f"{self._name}.{_digest(dependencies.encode())[:24]}"
@@ -265,5 +265,5 @@ def _dependencies(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]
         called = getattr(value, "py_func", None) or getattr(value, "_defn", None)
         if called is not None:
             yield from _dependencies(called, seen)
-        elif isinstance(value, CONSTANTS):
+        elif isinstance(value, CONSTANT_TYPES):
             yield f"{name} = {value.tobytes() if isinstance(value, np.ndarray) else value!r}"

@@ -6,10 +6,10 @@ import logging
 import sys
 from collections.abc import Callable
 
-TEXT = "compiling kernels, which takes up to a minute; later runs reuse them"
+ANNOUNCEMENT = "compiling kernels, which takes up to a minute; later runs reuse them"
 log = logging.getLogger("fastcontact")
 count = 0  # number of kernels that this process has compiled, or has run in Python instead
-_reported = False
+_announced = False
 
 
 def notify() -> None:
@@ -20,10 +20,10 @@ def notify() -> None:
 
 def announce() -> None:
     """Notify all listeners that kernels are being compiled, and log this once per process at level INFO."""
-    global _reported
-    if not _reported:
-        _reported = True
-        log.info(TEXT)
+    global _announced
+    if not _announced:
+        _announced = True
+        log.info(ANNOUNCEMENT)
     for listener in list(listeners):
         listener()
 
@@ -37,7 +37,10 @@ def count_uncompiled() -> None:
 
 
 def wait(name: str) -> bool:
-    """Wait for helpers that compile a kernel called `name`; return whether there were any, whose file may now exist."""
+    """Wait for helpers that compile a kernel called `name`; return whether there were any.
+
+    If there were any, the file of the kernel may now exist.
+    """
     return any(waiter(name) for waiter in waiters)
 
 
@@ -46,11 +49,11 @@ def print_announcement() -> None:
     listeners.remove(print_announcement)
     visible = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     if not listeners and not log.isEnabledFor(logging.INFO) and visible and not in_worker():
-        print(f"fastcontact: {TEXT}", file=sys.stderr, flush=True)
+        print(f"fastcontact: {ANNOUNCEMENT}", file=sys.stderr, flush=True)
 
 
 def in_worker() -> bool:
-    """Return whether this is a worker process, in which `multiprocessing` is already imported."""
+    """Return whether this is a worker process of `multiprocessing`, without importing that module."""
     multiprocessing = sys.modules.get("multiprocessing")
     return multiprocessing is not None and multiprocessing.parent_process() is not None
 

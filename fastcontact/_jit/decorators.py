@@ -38,14 +38,14 @@ class _Compilations(event.Listener):  # type: ignore[misc]
     """
 
     depth = 0  # nesting depth: the compilation of a kernel includes those of the kernels that it calls
-    collects = True
+    was_collecting = True
 
     def on_start(self, raised_event: Any) -> None:
         """Notify listeners and suspend garbage collection."""
         if getattr(raised_event.data["dispatcher"], "__module__", "").startswith("fastcontact."):
             compiling.notify()
             if self.depth == 0:
-                self.collects = gc.isenabled()
+                self.was_collecting = gc.isenabled()
                 gc.disable()
             self.depth += 1
 
@@ -53,7 +53,7 @@ class _Compilations(event.Listener):  # type: ignore[misc]
         """Resume garbage collection."""
         if getattr(raised_event.data["dispatcher"], "__module__", "").startswith("fastcontact."):
             self.depth -= 1
-            if self.depth == 0 and self.collects:
+            if self.depth == 0 and self.was_collecting:
                 gc.enable()
 
 
@@ -74,7 +74,7 @@ def interpretable_kernel(function: Callable[..., Any]) -> Any:
     round-off in NumPy. Other kernels cannot call it, since the returned object is not a Numba dispatcher.
     """
     dispatcher = kernel(function)
-    return interpreting.Interpretable(dispatcher, cache.files.get(function)) if compiled() else dispatcher
+    return interpreting.InterpretableKernel(dispatcher, cache.files.get(function)) if jit_enabled() else dispatcher
 
 
 def summing_kernel(function: Callable[..., Any]) -> Any:
@@ -117,7 +117,7 @@ if hasattr(os, "register_at_fork"):  # the helpers of the parent do not report t
     os.register_at_fork(after_in_child=compiling.waiters.clear)
 
 
-def compiled() -> bool:
+def jit_enabled() -> bool:
     """Return whether kernels are compiled in this process, that is, unless NUMBA_DISABLE_JIT is set."""
     return not getattr(numba.config, "DISABLE_JIT", False)
 

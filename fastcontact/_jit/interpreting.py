@@ -25,18 +25,18 @@ import numpy as np
 from fastcontact._jit import compiling
 from fastcontact._jit.cache import KernelFiles, cache_folder
 
-# Limits for running a kernel in Python: number of entries of all arguments of a call, time of all its calls in one run [s],
-# and time of all its calls in all runs [s]. Python takes 1 to 8 microseconds per entry. The compilation of a kernel takes 0.2
-# to 3 seconds; for most kernels, it takes less than the last limit.
+# Limits for running a kernel in Python: number of entries of all arguments of a call, time of all calls of the kernel in one
+# run [s], and time of all its calls in all runs [s]. Python takes 1 to 8 microseconds per entry. The compilation of a kernel
+# takes 0.2 to 3 seconds; for most kernels, it takes less than the last limit.
 MAX_ENTRIES, MAX_SECONDS, MAX_SECONDS_OF_RUNS = 200_000, 0.5, 1.0
 # Name of the file, in the folder of the compiled kernels, with the time of uncompiled kernels in Python [s], by version.
 TIMES_FILE = "interpreted.json"
 # Types for which NumPy and Numba yield the same results. The two libraries promote smaller types differently, but types of
 # one byte occur only in comparisons.
-EXACT = ("float64", "int64", "int32", "uint8", "bool")
+EXACT_TYPES = ("float64", "int64", "int32", "uint8", "bool")
 
 
-class Interpretable:
+class InterpretableKernel:
     """A kernel that runs in Python as long as its calls are small and no compiled version exists.
 
     Parameters
@@ -50,7 +50,7 @@ class Interpretable:
     def __init__(self, compiled: Any, files: KernelFiles | None) -> None:
         functools.update_wrapper(self, compiled.py_func)
         self.compiled, self.py_func, self.compile = compiled, compiled.py_func, compiled.compile
-        self.files, self.spent = files, 0.0
+        self.files, self.seconds = files, 0.0  # time of the calls in Python [s]
         self._call: Callable[..., Any] = self._choose
 
     def __call__(self, *arguments: Any) -> Any:
@@ -64,28 +64,29 @@ class Interpretable:
         if is_compiled or not self._is_small(arguments):
             self._call = self.compiled
             return self.compiled(*arguments)
-        if self.spent == 0.0:
+        if self.seconds == 0.0:
             compiling.count_uncompiled()
             _interpreted.append(self)
         result = interpret(self, arguments)
-        self.spent += time.thread_time() - began
+        self.seconds += time.thread_time() - began
         return result
 
     def _is_small(self, arguments: tuple[Any, ...]) -> bool:
         """Return whether a call may run in Python: it is small, and the time so far is less than that of a compilation."""
-        if self.spent > MAX_SECONDS or entries(arguments) > MAX_ENTRIES:
+        if self.seconds > MAX_SECONDS or n_entries(arguments) > MAX_ENTRIES:
             return False
-        if _overdue or self.files is None:
+        if _long_running or self.files is None:
             return True
         earlier = _earlier_times(self.files.folder).get(self.files.version, 0.0)
-        _overdue.extend([self] if earlier + self.spent > MAX_SECONDS_OF_RUNS else [])
-        return not _overdue
+        if earlier + self.seconds > MAX_SECONDS_OF_RUNS:
+            _long_running.append(self)
+        return not _long_running
 
 
 # Kernels that this process has run in Python, and the kernel that it compiles because of its time in earlier runs. In each
 # run only one kernel is compiled for this reason, so that no single run has to compile all of them.
-_interpreted: list[Interpretable] = []
-_overdue: list[Interpretable] = []
+_interpreted: list[InterpretableKernel] = []
+_long_running: list[InterpretableKernel] = []
 
 
 @functools.cache
@@ -99,7 +100,7 @@ def _earlier_times(folder: Path) -> dict[str, float]:
 
 def save_times() -> None:
     """Add the times of this process to those of earlier runs. Of runs that end simultaneously, only one is counted."""
-    spent = {kernel.files.version: kernel.spent for kernel in _interpreted if kernel.files is not None}
+    spent = {kernel.files.version: kernel.seconds for kernel in _interpreted if kernel.files is not None}
     if spent and (folder := cache_folder()) is not None:
         _earlier_times.cache_clear()
         sums = _earlier_times(folder)
@@ -120,11 +121,11 @@ def interpret(kernel: Any, arguments: tuple[Any, ...]) -> Any:
         return _to_python(python_function(kernel)(*map(_to_numpy, arguments)))
 
 
-def entries(argument: Any) -> float:
-    """Return the number of entries of an array, a scalar or a tuple of these; infinite for a type that is not `EXACT`."""
+def n_entries(argument: Any) -> float:
+    """Return the number of entries of an array, a scalar or a tuple of these; infinite for types not in `EXACT_TYPES`."""
     if isinstance(argument, tuple):
-        return float(sum(map(entries, argument)))
-    exact = isinstance(argument, bool | int | float) or getattr(argument, "dtype", "") in EXACT
+        return float(sum(map(n_entries, argument)))
+    exact = isinstance(argument, bool | int | float) or getattr(argument, "dtype", "") in EXACT_TYPES
     return float(np.size(argument)) if exact else np.inf
 
 

@@ -21,7 +21,7 @@ Item = TypeVar("Item")
 Parameters = ParamSpec("Parameters")
 # Largest amount of work, counted in nodes, that a single thread completes sooner than several threads, since waking them
 # takes 0.03 ms; default number of nodes of a cell; and largest number of threads.
-SINGLE_THREAD_WORK, NODES = 80_000, 4
+SINGLE_THREAD_WORK, NODES_PER_CELL = 80_000, 4
 MAX_THREADS = 255
 
 
@@ -36,15 +36,15 @@ if hasattr(os, "register_at_fork"):
 
 
 def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """Return the results of a function for all items: this thread computes the first item, and others compute one each."""
+    """Return the results of a function for all items: this thread computes the first one, other threads one each."""
     if len(items) == 1:
         return [function(items[0])]
-    others = [_pool().submit(function, item) for item in items[1:]]
+    futures = [_pool().submit(function, item) for item in items[1:]]
     try:
         first = function(items[0])
     finally:
-        wait(others)  # also after an error, because other threads still use the arguments of this call
-    return [first, *(other.result() for other in others)]
+        wait(futures)  # also after an error, because other threads still use the arguments of this call
+    return [first, *(future.result() for future in futures)]
 
 
 def parallel_for(kernel: Any, count: int, work: float, *arguments: Any) -> None:
@@ -59,7 +59,7 @@ def parallel_for(kernel: Any, count: int, work: float, *arguments: Any) -> None:
 
 
 @cache
-def _libraries() -> Any:
+def _thread_controller() -> Any:
     """Return the controller of the threads of numerical libraries."""
     from threadpoolctl import ThreadpoolController
 
@@ -75,20 +75,20 @@ def on_one_blas_thread(function: Callable[Parameters, Result]) -> Callable[Param
 
     @wraps(function)
     def limited(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
-        with _libraries().limit(limits=1, user_api="blas"):
+        with _thread_controller().limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
     return limited
 
 
-def read_only(numbers: AnyArray) -> AnyArray:
-    """Return a read-only view, because a kernel for the read-only arrays of a mesh would be compiled again for others."""
-    view = numbers.view()
+def read_only(array: AnyArray) -> AnyArray:
+    """Return a read-only view of an array, for kernels that are compiled for the read-only arrays of meshes."""
+    view = array.view()
     view.flags.writeable = False
     return view
 
 
-def portions(count: int, work: float = NODES) -> list[tuple[int, int]]:
+def portions(count: int, work: float = NODES_PER_CELL) -> list[tuple[int, int]]:
     """Return ranges of nearly equal size that cover 0 to `count`: one per thread, or a single one for little work.
 
     `work` is the work per cell, counted in nodes; a node takes about ten nanoseconds.

@@ -23,14 +23,14 @@ from typing import Any, NamedTuple, TypeVar, Union
 import numpy as np
 import numpy.typing
 
-from fastcontact.arrays import REFUSAL, is_masked
+from fastcontact.arrays import MASKED_ENTRIES, is_masked
 from fastcontact.errors import FastcontactError, nearest
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARRAY_LIKE = {*typing.get_args(np.typing.ArrayLike)}
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
-_REAL = {bool: "True or False", int: "a whole number", float: "a number"}
+_SCALAR_NAMES = {bool: "True or False", int: "a whole number", float: "a number"}
 
 
 def typed(error: type[FastcontactError]) -> Callable[[F], F]:
@@ -39,32 +39,32 @@ def typed(error: type[FastcontactError]) -> Callable[[F], F]:
     The constructor and the public methods of a class are checked.
     """
 
-    def decorate(call: F) -> F:
-        if not isinstance(call, type):
-            return typing.cast(F, _checked(call, call.__qualname__, error))
-        for name, method in [*vars(call).items()]:
+    def decorate(target: F) -> F:
+        if not isinstance(target, type):
+            return typing.cast(F, _checked(target, target.__qualname__, error))
+        for name, method in [*vars(target).items()]:
             if isinstance(method, types.FunctionType) and (name == "__init__" or not name.startswith("_")):
-                setattr(call, name, _checked(method, f"{call.__name__}.{name}", error))
-        return call
+                setattr(target, name, _checked(method, f"{target.__name__}.{name}", error))
+        return target
 
     return decorate
 
 
-def unchecked(call: F) -> F:
-    """Return the function behind a `typed` one, for calls within the package whose arguments need no check."""
-    return typing.cast(F, inspect.unwrap(call))
+def unchecked(function: F) -> F:
+    """Return the function that `typed` has decorated, for calls within the package, whose arguments need no check."""
+    return typing.cast(F, inspect.unwrap(function))
 
 
-def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError]) -> Callable[..., Any]:
-    """Return a function that checks its arguments and then calls `call`; error messages call it `name`."""
+def _checked(function: Callable[..., Any], name: str, error: type[FastcontactError]) -> Callable[..., Any]:
+    """Return a function that checks its arguments and then calls `function`; error messages call it `name`."""
 
-    @functools.wraps(call)
+    @functools.wraps(function)
     def wrapper(*args: Any, **kwargs: Any) -> Any:
-        signature = _signature(call)
+        signature = _signature(function)
         try:
-            values, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
+            values, annotations = signature.bind(*args, **kwargs).arguments, types_of(function)
         except TypeError:
-            raise _argument_error(call, signature, _public_name(call, name, args), args, kwargs) from None
+            raise _argument_error(function, signature, _public_name(function, name, args), args, kwargs) from None
         for key, value in values.items():
             parameter = signature.parameters[key]
             annotation = annotations.get(key, Any)
@@ -79,12 +79,12 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
                 members = {key: value}
             for argument, member in members.items():
                 if is_masked(member) or not fits(member, annotation):
-                    called = _public_name(call, name, args)
+                    called = _public_name(function, name, args)
                     check_type(f"the argument {argument} of {called}", member, annotation, error)
-        return call(*args, **kwargs)
+        return function(*args, **kwargs)
 
-    if any(str(annotation).startswith("Unpack[") for annotation in call.__annotations__.values()):
-        wrapper.__signature__ = _help_signature(_signature(call), call)  # type: ignore[attr-defined]
+    if any(str(annotation).startswith("Unpack[") for annotation in function.__annotations__.values()):
+        wrapper.__signature__ = _help_signature(_signature(function), function)  # type: ignore[attr-defined]
     return wrapper
 
 
@@ -93,12 +93,13 @@ _signature = functools.cache(inspect.signature)
 
 # First components of a load, a support or an initial state, by the name of the parameter that collects them.
 COMPONENTS = {"components": ["x", "y"], "tensor_components": ["xx", "yy"], "moments": ["z"]}
-# Beginnings of messages on arguments with components by axis.
-VECTORS = ("the argument motion ", "the argument force ")
+# Beginnings of messages about arguments with components by axis.
+VECTOR_ARGUMENTS = ("the argument motion ", "the argument force ")
 
 
 def _argument_error(
-    call: Callable[..., Any], signature: inspect.Signature, public_name: str, args: tuple[Any, ...], kwargs: dict[str, Any]
+    function: Callable[..., Any], signature: inspect.Signature, public_name: str, args: tuple[Any, ...],
+    kwargs: dict[str, Any],
 ) -> TypeError:  # fmt: skip
     """Return Python's error for missing, unknown and misplaced arguments, in which the function is called `public_name`.
 
@@ -114,12 +115,12 @@ def _argument_error(
         names = ", ".join([p.name for p in positional if p.name != "self"]) or "nothing"
         return TypeError(f"{public_name} takes {names} by position and all other arguments by keyword: write {example}")
     try:
-        call(*args, **kwargs)
+        function(*args, **kwargs)
     except TypeError as failure:
-        text = str(failure).replace(f"{call.__qualname__}()", f"{public_name}()", 1)
+        text = str(failure).replace(f"{function.__qualname__}()", f"{public_name}()", 1)
         missing = [key for key in signature.parameters if f"'{key}'" in text]
-        others = {key: nearest(key, missing) for key in kwargs if key not in signature.parameters}
-        corrections = [f"{near[0]} instead of {key}" for key, near in others.items() if near]
+        suggestions = {key: nearest(key, missing) for key in kwargs if key not in signature.parameters}
+        corrections = [f"{similar[0]} instead of {key}" for key, similar in suggestions.items() if similar]
         text += f": write {' and '.join(corrections)}" * bool(corrections)
         if unknown_key := text.partition("unexpected keyword argument '")[2].partition("'")[0]:
             text = text.partition(". Did you mean")[0]  # Python 3.13 suggests a name, too
@@ -130,10 +131,10 @@ def _argument_error(
     raise AssertionError(public_name)
 
 
-def _help_signature(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
+def _help_signature(signature: inspect.Signature, function: Callable[..., Any]) -> inspect.Signature:
     """Return the signature for `help`, in which the keys of an unpacked `TypedDict` are keyword arguments."""
     parameters = list(signature.parameters.values())
-    (keys,) = typing.get_args(types_of(call)[parameters[-1].name])
+    (keys,) = typing.get_args(types_of(function)[parameters[-1].name])
     kind = inspect.Parameter.KEYWORD_ONLY
     named = [
         inspect.Parameter(key, kind, default=None, annotation=getattr(text, "__forward_arg__", text))
@@ -142,10 +143,10 @@ def _help_signature(signature: inspect.Signature, call: Callable[..., Any]) -> i
     return signature.replace(parameters=[*parameters[:-1], *named])
 
 
-def _public_name(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
+def _public_name(function: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
     """Return the name of a function or a method in messages: for a constructor that of the class."""
     owner, _, method = name.rpartition(".")
-    if call.__name__ == "__init__" and args:
+    if function.__name__ == "__init__" and args:
         return type(args[0]).__name__
     return f"{type(args[0]).__name__}.{method}" if owner and args else name
 
@@ -161,15 +162,14 @@ def check_fields(owner: str, values: abc.Mapping[str, Any], kind: type, error: t
 
 
 @functools.cache
-def types_of(call: Callable[..., Any]) -> dict[str, Any]:
+def types_of(target: Callable[..., Any]) -> dict[str, Any]:
     """Return the types of the arguments of a function, or of the fields of a class, by name."""
     annotations: dict[str, Any] = {}
-    namespace = vars(sys.modules[call.__module__])
-    for name, annotation in inspect.get_annotations(call).items():
-        text = getattr(annotation, "__forward_arg__", annotation)  # typed dictionaries contain forward references
+    namespace = vars(sys.modules[target.__module__])
+    for name, text in inspect.get_annotations(target).items():
         try:
-            annotations[name] = eval(text, namespace) if isinstance(text, str) else text
-        except (NameError, TypeError):  # a name that only type checkers import, or not the annotation of an argument
+            annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), namespace)
+        except (NameError, TypeError):  # a name that only type checkers import, or an annotation that is not a type
             continue
     return annotations
 
@@ -177,7 +177,7 @@ def types_of(call: Callable[..., Any]) -> dict[str, Any]:
 def check_type(name_shown: str, value: Any, annotation: Any, error: type[FastcontactError]) -> None:
     """Raise `error` if a value does not have the annotated type or is masked; the message calls it `name_shown`."""
     if is_masked(value):
-        raise error(f"{name_shown} {REFUSAL}")
+        raise error(f"{name_shown} {MASKED_ENTRIES}")
     if fits(value, annotation):
         return
     description = f"an object of the class {type(value).__name__}"
@@ -194,7 +194,7 @@ def check_type(name_shown: str, value: Any, annotation: Any, error: type[Fastcon
     remedy = ""
     if isinstance(value, str) and _is_number(value) and fits(1, annotation):
         remedy = f": write {value.strip()} without quotation marks"
-    elif isinstance(value, list | tuple) and value and name_shown.startswith(VECTORS) and fits({}, annotation):
+    elif isinstance(value, list | tuple) and value and name_shown.startswith(VECTOR_ARGUMENTS) and fits({}, annotation):
         remedy = f": write {dict(zip('xyz', value, strict=False))}"
     raise error(f"{name_shown} must be {type_name(annotation)}, not {description}{remedy}")
 
@@ -219,99 +219,99 @@ def values_at(function: Callable[..., Any], points: Any, name: str, error: type[
             "such an array to see where"
         ) from failure
     if is_masked(result):
-        raise error(f"{name} is a function whose result {REFUSAL}")
+        raise error(f"{name} is a function whose result {MASKED_ENTRIES}")
     return result
 
 
-class Kind(NamedTuple):
-    """Test whether values have an annotated type, without consuming iterators, and the name of the type in messages."""
+class TypeTest(NamedTuple):
+    """Test of values for an annotated type, which does not consume iterators, and the name of the type in messages."""
 
     fits: Callable[[Any], bool]
-    words: str
+    name: str
 
 
 def fits(value: Any, annotation: Any) -> bool:
     """Return whether a value has the annotated type; the members of iterators are not tested."""
-    return kind_of(annotation).fits(value)
+    return type_test(annotation).fits(value)
 
 
 def type_name(annotation: Any) -> str:
     """Return the name of an annotated type in messages, such as "a number or a function"."""
-    return kind_of(annotation).words
+    return type_test(annotation).name
 
 
 @functools.cache
-def kind_of(annotation: Any) -> Kind:
+def type_test(annotation: Any) -> TypeTest:
     """Return the test and the name of an annotated type."""
-    kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
-    if annotation == np.typing.ArrayLike or kind is np.ndarray:
-        return Kind(_is_array_like, "an array of numbers")
-    if kind in (Union, types.UnionType):
-        return _union_kind(members)
+    origin, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
+    if annotation == np.typing.ArrayLike or origin is np.ndarray:
+        return TypeTest(_is_array_like, "an array of numbers")
+    if origin in (Union, types.UnionType):
+        return _union_test(members)
     if annotation in (None, type(None)):
-        return Kind(lambda value: value is None, "None")
-    if annotation in _REAL:
-        return Kind(lambda value: _is_real(value, annotation), _REAL[annotation])
-    if kind in (tuple, list, abc.Sequence, abc.Iterable, abc.Collection):
-        return _sequence_kind(kind, members)
-    if kind in (abc.Mapping, dict):
-        return _mapping_kind(members)
+        return TypeTest(lambda value: value is None, "None")
+    if annotation in _SCALAR_NAMES:
+        return TypeTest(lambda value: _is_real(value, annotation), _SCALAR_NAMES[annotation])
+    if origin in (tuple, list, abc.Sequence, abc.Iterable, abc.Collection):
+        return _sequence_test(origin, members)
+    if origin in (abc.Mapping, dict):
+        return _mapping_test(members)
     names = {str: "string", os.PathLike: "path", abc.Callable: "function"}
-    name = str(names.get(kind) or getattr(kind, "__name__", kind))
-    return Kind(_simple_test(annotation, kind, members), f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
+    name = str(names.get(origin) or getattr(origin, "__name__", origin))
+    return TypeTest(_simple_test(annotation, origin, members), f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
 
 
-def _simple_test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any], bool]:
+def _simple_test(annotation: Any, origin: Any, members: tuple[Any, ...]) -> Callable[[Any], bool]:
     """Return the test of a type without member types."""
-    if kind is typing.Literal:
+    if origin is typing.Literal:
         are_strings = all(isinstance(member, str) for member in members)  # functions check the values of strings
         return lambda value: isinstance(value, str) if are_strings else value in members
-    if kind is os.PathLike:
+    if origin is os.PathLike:
         return lambda value: isinstance(value, os.PathLike) and isinstance(os.fspath(value), str)
-    if kind is abc.Callable:
+    if origin is abc.Callable:
         return callable
-    if getattr(kind, "_is_protocol", False):
-        names = [name for name in (*vars(kind), *inspect.get_annotations(kind)) if not name.startswith("_")]
+    if getattr(origin, "_is_protocol", False):
+        names = [name for name in (*vars(origin), *inspect.get_annotations(origin)) if not name.startswith("_")]
         return lambda value: all(hasattr(value, name) for name in names) and not isinstance(value, type)
-    if annotation in (Any, inspect.Parameter.empty) or not isinstance(kind, type):
+    if annotation in (Any, inspect.Parameter.empty) or not isinstance(origin, type):
         return lambda value: True
-    return lambda value: isinstance(value, kind)
+    return lambda value: isinstance(value, origin)
 
 
-def _union_kind(members: tuple[Any, ...]) -> Kind:
+def _union_test(members: tuple[Any, ...]) -> TypeTest:
     """Return the test and the name of a union, in which None comes last."""
     if {*members} >= _ARRAY_LIKE:  # ArrayLike is itself a union
         members = (np.typing.ArrayLike, *(member for member in members if member not in _ARRAY_LIKE))
-    kinds = [kind_of(member) for member in members]
-    phrases = sorted(dict.fromkeys(kind.words for kind in kinds), key="None".__eq__)
-    return Kind(lambda value: any(kind.fits(value) for kind in kinds), " or ".join(phrases))
+    tests = [type_test(member) for member in members]
+    phrases = sorted(dict.fromkeys(test.name for test in tests), key="None".__eq__)
+    return TypeTest(lambda value: any(test.fits(value) for test in tests), " or ".join(phrases))
 
 
-def _sequence_kind(kind: Any, members: tuple[Any, ...]) -> Kind:
+def _sequence_test(origin: Any, members: tuple[Any, ...]) -> TypeTest:
     """Return the test and the name of a sequence. In an array only the first member is tested, in an iterator no member."""
-    kinds = [kind_of(member) for member in members if member is not ...]
-    if kind is tuple and members and members[-1] is not ...:
+    tests = [type_test(member) for member in members if member is not ...]
+    if origin is tuple and members and members[-1] is not ...:
         count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
         phrase = f"{count} numbers" if {*members} <= {int, float} else f"a sequence of {count}"
-        return Kind(lambda value: _is_sequence(value) and hasattr(value, "__len__") and len(value) == len(kinds)
-                    and all(member_kind.fits(member) for member_kind, member in zip(kinds, value)), phrase)  # fmt: skip
+        return TypeTest(lambda value: _is_sequence(value) and hasattr(value, "__len__") and len(value) == len(tests)
+                    and all(test.fits(member) for test, member in zip(tests, value)), phrase)  # fmt: skip
 
     def fits(value: Any) -> bool:
-        if not kinds or not isinstance(value, list | tuple | set | frozenset | np.ndarray):
+        if not tests or not isinstance(value, list | tuple | set | frozenset | np.ndarray):
             return _is_sequence(value)
-        return _is_sequence(value) and all(map(kinds[0].fits, value[:1] if isinstance(value, np.ndarray) else value))
+        return _is_sequence(value) and all(map(tests[0].fits, value[:1] if isinstance(value, np.ndarray) else value))
 
-    return Kind(fits, "a sequence" + (f" of {_plural(kinds[0].words)}" if kinds else ""))
+    return TypeTest(fits, "a sequence" + (f" of {_plural(tests[0].name)}" if tests else ""))
 
 
-def _mapping_kind(members: tuple[Any, ...]) -> Kind:
+def _mapping_test(members: tuple[Any, ...]) -> TypeTest:
     """Return the test and the name of a mapping."""
     if not members:
-        return Kind(lambda value: isinstance(value, abc.Mapping), "a dictionary")
-    keys, values = map(kind_of, members)
-    of = f" of {_plural(values.words)}" if members[1] is not Any else ""
-    return Kind(lambda value: isinstance(value, abc.Mapping) and all(map(keys.fits, value))
-                and all(map(values.fits, value.values())), f"a dictionary{of} by name")  # fmt: skip
+        return TypeTest(lambda value: isinstance(value, abc.Mapping), "a dictionary")
+    keys, values = map(type_test, members)
+    of_values = f" of {_plural(values.name)}" if members[1] is not Any else ""
+    return TypeTest(lambda value: isinstance(value, abc.Mapping) and all(map(keys.fits, value))
+                and all(map(values.fits, value.values())), f"a dictionary{of_values} by name")  # fmt: skip
 
 
 def _is_real(value: Any, kind: type) -> bool:

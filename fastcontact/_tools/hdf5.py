@@ -27,9 +27,9 @@ PLAUSIBLE_EXPANSION = 20
 PLAUSIBLE_IN_ALL = 1 << 30
 PLAUSIBLE_EXPANSION_IN_ALL = 100
 # Number of strings or references that a data set may contain regardless of the size of its file.
-FEW_OBJECTS = 1000
-# Largest depth of nested groups. HDF5 visits them by recursion, and deep nesting would overflow its stack.
-DEEPEST = 64
+MIN_OBJECT_LIMIT = 1000
+# Largest nesting depth of groups. HDF5 visits groups by recursion, and deeper nesting could overflow its stack.
+MAX_DEPTH = 64
 # Allowed kinds of data: numbers and strings of fixed length.
 PLAIN_KINDS = "iufS"
 
@@ -65,10 +65,10 @@ def check_contents(file: Any, path: PathLike) -> None:
     file_size, total = file.id.get_filesize(), 0
     limit = max(PLAUSIBLE_BYTES, PLAUSIBLE_EXPANSION * file_size)
     limit_in_all = max(PLAUSIBLE_IN_ALL, PLAUSIBLE_EXPANSION_IN_ALL * file_size)
-    seen: set[Any] = {h5o.get_info(file["/"].id).addr}
-    waiting: list[tuple[Any, str, int]] = [(file["/"].id, "", 0)]
-    while waiting:
-        group, where, depth = waiting.pop()
+    addresses: set[Any] = {h5o.get_info(file["/"].id).addr}
+    pending: list[tuple[Any, str, int]] = [(file["/"].id, "", 0)]
+    while pending:
+        group, where, depth = pending.pop()
         links: list[tuple[bytes, int]] = []
         group.links.iterate(lambda name, info, links=links: links.append((name, info.type)), info=True)
         for link_name, kind in links:
@@ -87,10 +87,10 @@ def check_contents(file: Any, path: PathLike) -> None:
                     )
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
-                if address in seen or depth >= DEEPEST:
+                if address in addresses or depth >= MAX_DEPTH:
                     raise FileError(f"'{path}' has cyclic or too deeply nested groups at '{name[:80]}': write it again")
-                seen.add(address)
-                waiting.append((item, name, depth + 1))
+                addresses.add(address)
+                pending.append((item, name, depth + 1))
 
 
 def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
@@ -101,13 +101,13 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
     layout = settings.get_layout()
     if layout == h5d.VIRTUAL or settings.get_external_count():
         raise FileError(f"{where} stores its values in another file: copy the data into one file")
-    item, count = dataset.get_type().get_size(), dataset.get_space().get_simple_extent_npoints()
-    size = count * item
+    item_size, count = dataset.get_type().get_size(), dataset.get_space().get_simple_extent_npoints()
+    size = count * item_size
     # Each string or reference becomes a Python object, and takes space in the file.
-    if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
+    if count > max(MIN_OBJECT_LIMIT, file_size // 8) and dataset.dtype.hasobject:
         raise FileError(f"{where} declares {count} strings or references, which its file cannot hold: write it again")
     if layout == h5d.CHUNKED:
-        chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item
+        chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item_size
         built_in = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
                h5z.FILTER_NBIT, h5z.FILTER_SCALEOFFSET)  # fmt: skip
         filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]

@@ -15,12 +15,12 @@ T = TypeVar("T")
 def lazy_names(package: str, title: str = "") -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package.
 
-    The stub ``__init__.pyi`` of the package lists the names with their modules for type checkers; here they are imported on
-    first use. Messages call the package `title`, by default by its name.
+    The names and their modules are read from ``__init__.pyi``, the stub of the package for type checkers. Messages call the
+    package `title`, by default by its name.
     """
     stub = (pkgutil.get_data(package, "__init__.pyi") or b"").decode()
-    found = re.findall(r"^from ([\w.]+) import \(?\s*(\w+) as", stub, re.MULTILINE)
-    module_of = {name: module for module, name in found}
+    imports = re.findall(r"^from ([\w.]+) import \(?\s*(\w+) as", stub, re.MULTILINE)
+    module_of = {name: module for module, name in imports}
     public = sorted(module_of.keys() - {"__version__"})
 
     def attribute(name: str) -> Any:
@@ -43,8 +43,9 @@ class LazyDict(Mapping[str, T]):
     Parameters
     ----------
     names : iterable of str
+        Names of the objects.
     load : Callable
-        Function that imports the object of a name.
+        Function that imports the object with a given name and returns it.
     """
 
     def __init__(self, names: Iterable[str], load: Callable[[str], T]) -> None:

@@ -30,15 +30,15 @@ def nearest(points: Array, positions: Array) -> tuple[Array, Indices]:
     return np.asarray(distance), np.asarray(rows, np.intp)
 
 
-def close_pairs(points: Array, within: float) -> Indices:
-    """Return the pairs of rows (k, 2) of `points` (n, dim) [length] whose distance is at most `within` [length]."""
+def close_pairs(points: Array, max_distance: float) -> Indices:
+    """Return the pairs of rows (k, 2) of `points` (n, dim) [length] whose distance is at most `max_distance` [length]."""
     projection = points @ PROJECTION[: points.shape[1]]
     order = np.argsort(projection)
-    near = np.diff(projection[order]) <= within
-    if not near.any():
+    is_close = np.diff(projection[order]) <= max_distance
+    if not is_close.any():
         return np.empty((0, 2), np.intp)
-    rows = np.sort(order[np.append(near, False) | np.insert(near, 0, False)])
-    second, first = pairs_within(points[rows], points[rows], np.full(len(rows), within))
+    rows = np.sort(order[np.append(is_close, False) | np.insert(is_close, 0, False)])
+    second, first = pairs_within(points[rows], points[rows], np.full(len(rows), max_distance))
     pairs = rows[np.column_stack([first, second])[first < second]]
     return pairs[np.lexsort(pairs.T[::-1])]
 
@@ -58,10 +58,10 @@ def pairs_within(points: Array, centres: Array, radii: Array) -> tuple[Indices, 
         centre = np.repeat(np.arange(len(centres)), end - first)
         point = order[np.arange(len(centre)) + np.repeat(end - np.cumsum(end - first), end - first)]
         for x, x_centre in zip(points.T, centres.T, strict=True):  # each coordinate excludes most of the other pairs
-            near = np.abs(x[point] - x_centre[centre]) <= radii[centre]
-            point, centre = point[near], centre[near]
-        near = ((points[point] - centres[centre]) ** 2).sum(axis=1) <= radii[centre] ** 2
-        return point[near], centre[near]
+            is_close = np.abs(x[point] - x_centre[centre]) <= radii[centre]
+            point, centre = point[is_close], centre[is_close]
+        is_close = ((points[point] - centres[centre]) ** 2).sum(axis=1) <= radii[centre] ** 2
+        return point[is_close], centre[is_close]
     from scipy.spatial import cKDTree
 
     members = cKDTree(points).query_ball_point(centres, radii)

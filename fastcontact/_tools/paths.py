@@ -101,7 +101,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
         with tempfile.TemporaryDirectory() as folder:
             temporary = Path(folder, Path(path).name)
             yield temporary
-            _send(temporary, path)
+            _copy_to_stream(temporary, path)
         return
     target = checked_target(path)
     # The suffix is kept, because writers derive the format from it.
@@ -121,7 +121,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def _send(file: Path, stream: PathLike) -> None:
+def _copy_to_stream(file: Path, stream: PathLike) -> None:
     """Write a file to a stream; if the stream is a descriptor of this process, its write position is kept."""
     number = descriptor(stream)
     try:
@@ -139,11 +139,11 @@ def _synchronise(path: Path) -> None:
     """Synchronise a file or the entries of a folder to disk. Folders are ignored on Windows, which cannot open them."""
     if path.is_dir() and os.name == "nt":
         return
-    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    opened = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     try:
-        os.fsync(descriptor)
+        os.fsync(opened)
     except OSError as error:
         if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems without synchronisation
             raise
     finally:
-        os.close(descriptor)
+        os.close(opened)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from fastcontact.errors import ModelError, check_known
 
 # Values of units in SI units, by quantity and name.
-KNOWN: dict[str, dict[str, float]] = {
+UNITS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222},
     "pressure": {
@@ -15,11 +15,11 @@ KNOWN: dict[str, dict[str, float]] = {
         **{"psi": 6894.757, "ksi": 6894757.0},
     },
 }
-EXAMPLE = "units of length, force and pressure in this order, such as 'mm, N, MPa'"
+EXPECTED = "units of length, force and pressure in this order, such as 'mm, N, MPa'"
 
 
 def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
-    """Return the names of units by quantity, from a string in the order of `KNOWN` or from a mapping.
+    """Return the names of units by quantity, from a string in the order of `UNITS` or from a mapping.
 
     Raises ModelError for other arguments, and for a name that is known as the unit of another quantity.
 
@@ -30,20 +30,20 @@ def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
     """
     if isinstance(units, str):
         names = [name.strip() for name in units.split(",")]
-        if len(names) != len(KNOWN) or not all(names):
-            raise ModelError(f"units = '{units}' must be the {EXAMPLE}")
-        units = dict(zip(KNOWN, names, strict=True))
+        if len(names) != len(UNITS) or not all(names):
+            raise ModelError(f"units = '{units}' must be the {EXPECTED}")
+        units = dict(zip(UNITS, names, strict=True))
     for kind, name in units.items():
-        check_known("kind of unit", kind, KNOWN, ModelError)
-        for other, known_units in KNOWN.items():
-            if name in known_units and other != kind:
-                raise ModelError(f"'{name}' is a unit of {other}, not of {kind}: give the {EXAMPLE}")
+        check_known("kind of unit", kind, UNITS, ModelError)
+        for other_kind, known_units in UNITS.items():
+            if name in known_units and other_kind != kind:
+                raise ModelError(f"'{name}' is a unit of {other_kind}, not of {kind}: give the {EXPECTED}")
     return dict(units)
 
 
-def in_si(units: Mapping[str, str], kind: str) -> float | None:
+def si_value(units: Mapping[str, str], kind: str) -> float | None:
     """Return the unit of the quantity `kind` in SI units; None if the unit has no name or an unknown name."""
-    return KNOWN[kind].get(units.get(kind, ""))
+    return UNITS[kind].get(units.get(kind, ""))
 
 
 def inconsistency_message(units: Mapping[str, str]) -> str:
@@ -51,7 +51,7 @@ def inconsistency_message(units: Mapping[str, str]) -> str:
 
     The message is empty if the units are consistent, or if one of them is unknown.
     """
-    length, force, pressure = (in_si(units, kind) for kind in KNOWN)
+    length, force, pressure = (si_value(units, kind) for kind in UNITS)
     if length is None or force is None or pressure is None or 0.99 < (ratio := force / length**2 / pressure) < 1.01:
         return ""
     return (

@@ -15,7 +15,7 @@ from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
-from fastcontact.linear.sparse_rows import without_remnants
+from fastcontact.linear.sparse_rows import without_round_off
 from fastcontact.round_off import SINGLE_PRECISION
 
 
@@ -85,7 +85,7 @@ class ActiveDofs:
         least[0, constraints.softness > 0.0] = SINGLE_PRECISION
         for k, R in enumerate((constraints.B, *constraints.tangents)):
             reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
-            rows.append(without_remnants(csr_array(reduced[:, self._unknowns]), R, least[k]))
+            rows.append(without_round_off(csr_array(reduced[:, self._unknowns]), R, least[k]))
         prescribed = constraints.usable & (constraints.softness > 0.0) & (np.diff(rows[0].indptr) == 0)
         tangents, slip0 = tuple(rows[1:]), offsets[1:]
         return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tangents, slip0=slip0, prescribed=prescribed)

@@ -74,7 +74,7 @@ def solve(
 
     while True:
         rows, compliance, wanted = np.flatnonzero(active), constraints.normal_compliance, None
-        C = None if compliance is None else compliance.among(rows)
+        C = None if compliance is None else compliance.block_operator(rows)
         nodes = None if constraints.nodes is None else constraints.nodes[rows]
         B, values = constraints.B[rows], -constraints.gap0[rows]
         u, forces = loaded.solve(B, values, C, guess, monitor, accuracy.residual, nodes)

@@ -16,7 +16,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.contact_middle import ContactMiddle, contact_middle
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.integration import NO_AREA, lumped_areas
+from fastcontact.contact.integration import NEGLIGIBLE_AREA, lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import normals
@@ -146,8 +146,8 @@ def _contact_radius(
     place = middle.distances(pair.points[side.points])
     if pair.points.shape[1] == 3 and closed[place.argmin()]:  # not a ring around an open middle
         free = ~closed & ~pair.excluded[side.points]
-        low = min(low, float(place[closed & (side.beside @ free > 0)].min(initial=np.inf)))
-        high = max(high, float(place[free & (side.beside @ closed > 0)].max(initial=0.0)))
+        low = min(low, float(place[closed & (side.node_adjacency @ free > 0)].min(initial=np.inf)))
+        high = max(high, float(place[free & (side.node_adjacency @ closed > 0)].max(initial=0.0)))
     return low, high
 
 
@@ -215,7 +215,7 @@ def _closed_nodes(
     field, excluded = constraints.nodal, pair.excluded[pair.secondary.points]
     assert field is not None
     forces = constraints.normal_forces(constraints.contact_forces(multiplier))
-    side_pressure, covered = field.over_whole_side(forces), field.covered
+    side_pressure, covered = field.side_pressure(forces), field.covered
     if pair.options.kind in ALWAYS_CLOSED:
         # Nodes beyond the end of the other side are unpaired, but parts of their facets may face it.
         closed = np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
@@ -223,7 +223,7 @@ def _closed_nodes(
         magnitude = side_pressure
         if constraints.tied is not None:  # nodes of a cohesive layer are closed under tension and shear as well
             tangential = constraints.tied.forces(multiplier)[1]
-            magnitude = sum((np.abs(field.over_whole_side(t)) for t in tangential.T), np.abs(side_pressure))
+            magnitude = sum((np.abs(field.side_pressure(t)) for t in tangential.T), np.abs(side_pressure))
         closed = field.closed_nodes(active, gap, magnitude)
         never_opening = pair.never_opening(pair.points[pair.secondary.points], configuration)
         closed = closed | (never_opening & np.isfinite(gap))
@@ -256,8 +256,8 @@ def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask,
     """
     field, may_pull = constraints.nodal, bool(constraints.equality.any())
     assert field is not None
-    nodal_pressure, shares, areas = field.over_whole_side(forces), field.shares(forces), field.nodal_areas
-    with_area = areas > NO_AREA * np.abs(areas).mean()  # nodes that may receive shares of others
+    nodal_pressure, shares, areas = field.side_pressure(forces), field.nodal_forces(forces), field.nodal_areas
+    with_area = areas > NEGLIGIBLE_AREA * np.abs(areas).mean()  # nodes that may receive shares of others
     while True:
         if not may_pull:
             closed = closed & (nodal_pressure >= 0.0)
@@ -283,15 +283,15 @@ def _received_pressures(receivers: Mask, excess: Array, areas: Array, side: Surf
     """
     rings, visited = [receivers], receivers.copy()
     while (excess[~visited] != 0.0).any():
-        ring = (side.near @ rings[-1].astype(np.float64) > 0.0) & ~visited
+        ring = (side.extended_adjacency @ rings[-1].astype(np.float64) > 0.0) & ~visited
         if not ring.any():
             break
         rings.append(ring)
         visited |= ring
     for inner, outer in zip(rings[-2::-1], rings[:0:-1], strict=True):
         weights = np.where(inner, areas if inner is receivers else 1.0, 0.0)
-        per_weight = np.divide(excess, side.near @ weights, out=np.zeros_like(excess), where=outer)
-        excess = np.where(outer, 0.0, excess) + weights * (side.near @ per_weight)
+        per_weight = np.divide(excess, side.extended_adjacency @ weights, out=np.zeros_like(excess), where=outer)
+        excess = np.where(outer, 0.0, excess) + weights * (side.extended_adjacency @ per_weight)
     return np.divide(excess, areas, out=np.zeros_like(excess), where=receivers)
 
 
@@ -322,7 +322,7 @@ def _within_cone(constraints: Constraints, shear: Array, pressure: Array, normal
     """
     assert constraints.nodal is not None
     areas, limit = constraints.nodal.nodal_areas, constraints.friction.max() * np.maximum(pressure, 0.0)
-    receivers = (limit > 0.0) & (areas > NO_AREA * np.abs(areas).mean())
+    receivers = (limit > 0.0) & (areas > NEGLIGIBLE_AREA * np.abs(areas).mean())
     while True:
         size = np.linalg.norm(shear, axis=1)
         over, receivers = size > (1.0 + SUM_ROUND_OFF) * limit, receivers & (size < limit)
@@ -344,7 +344,7 @@ def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows:
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))
-    pressure, mean = constraints.nodal.over_whole_side(forces)[:, None], np.zeros_like(result.coordinates)
+    pressure, mean = constraints.nodal.side_pressure(forces)[:, None], np.zeros_like(result.coordinates)
     np.divide(constraints.nodal.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
     # The nodal values of a field may exceed the values from which it is computed.
     largest, length = np.linalg.norm(slips, axis=1).max(initial=0.0), np.linalg.norm(mean, axis=1)

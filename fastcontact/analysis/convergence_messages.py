@@ -18,7 +18,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
-from fastcontact.model.rigid_motions import NEARLY_SLIDING, grouped, least_held
+from fastcontact.model.rigid_motions import NEARLY_SLIDING, grouped_by_body, least_restrained
 from fastcontact.round_off import SINGLE_PRECISION
 
 Nodes = dict[str, list[int]]
@@ -111,7 +111,7 @@ def not_restrained(bodies: FloatingBodies, rigid: RigidPosition, load: float, fr
         Changes of the gaps in each free motion, which show whether contact hardly resists one of the motions [-].
     """
     if len(bodies.dofs) > 1:
-        weakest, ratio = least_held(bodies.motions, gaps)
+        weakest, ratio = least_restrained(bodies.motions, gaps)
         if ratio < NOTABLE:
             return (
                 f"contact hardly resists one motion, {weakest}, which changes the gaps {ratio:.1g} times as much as other "
@@ -119,7 +119,7 @@ def not_restrained(bodies: FloatingBodies, rigid: RigidPosition, load: float, fr
             )
     remedy = "Add a support or more friction, for which the loads may be too large" if friction else "Add a support"
     return (
-        f"contact does not hold {grouped(bodies.moving(rigid))}: after {rigid.positions} trial "
+        f"contact does not hold {grouped_by_body(bodies.moving(rigid))}: after {rigid.positions} trial "
         f"positions, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium"
         f"{f' under a load of {load:.3g}' if load else ''}. {remedy}"
     )

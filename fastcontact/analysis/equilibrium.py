@@ -369,7 +369,7 @@ class StepEquilibrium:
 
 def with_loads(problem: Problem, load: StepLoad) -> Loaded:
     """Return the prepared matrix of the problem with the right-hand side of a load."""
-    return problem.solver.load(problem.system.right(load.force, load.lift))
+    return problem.solver.load(problem.system.right_side(load.force, load.lift))
 
 
 def solve_displacements(

@@ -207,13 +207,13 @@ class FloatingBodies:
     """
 
     def __init__(self, motions: FreeMotions, system: System, soft: bool, model_springs: Sequence[Springs]) -> None:
-        diagonal, weightless = system.matrix.diagonal(), system.weightless
+        diagonal, no_stiffness = system.matrix.diagonal(), system.zero_stiffness
         # Smallest of several medians of the diagonal: one over the unknowns that each mode moves, one over those that no
         # mode moves.
-        solid, moving = system.free & ~weightless, motions.displacement != 0.0
+        solid, moving = system.free & ~no_stiffness, motions.displacement != 0.0
         groups = [solid & group for group in (*moving.T, ~moving.any(axis=1))]
         typical = min(float(np.median(diagonal[group])) for group in groups if group.any())
-        diagonal = np.where(weightless, typical, diagonal)
+        diagonal = np.where(no_stiffness, typical, diagonal)
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
         weights = np.sqrt(np.maximum(diagonal, 0.0))
@@ -225,8 +225,9 @@ class FloatingBodies:
         self._spring_labels = []
         for dof, modes_at_spring in zip(self.dofs.tolist(), self._values_at_springs, strict=True):
             row, component = divmod(dof, self._dim)
-            obstacle = motions.labels[int(np.argmax(np.abs(motions.parts[:, np.argmax(np.abs(modes_at_spring))])))].body
-            self._spring_labels.append(f"{'xyz'[component]} of {obstacle if weightless[dof] else f'point {row}'}")
+            weights_of_mode = motions.weights[:, np.argmax(np.abs(modes_at_spring))]
+            obstacle = motions.labels[int(np.argmax(np.abs(weights_of_mode)))].body
+            self._spring_labels.append(f"{'xyz'[component]} of {obstacle if no_stiffness[dof] else f'point {row}'}")
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._values_at_springs), np.float64))
         # A body on soft springs of the model that slides on an incline moves in all directions, which stiffer springs would
         # prevent.

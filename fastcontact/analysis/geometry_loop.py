@@ -176,7 +176,7 @@ def _settle(
         iterate.u[problem.dofs.active] = mixing.next(settled, last_update, displacement, tolerance, tolerances.inexact)
         tolerances.tighten(last_update.relative_change, solution.residual)
         late = update >= max(limit // 2, UPDATES_BEFORE_ROUNDING) and not iterate.rounded
-        if late and any(pair.alternates(constraints.parts[name]) for name, pair in problem.pairs.items()):
+        if late and any(pair.may_alternate(constraints.parts[name]) for name, pair in problem.pairs.items()):
             log.info("pairings alternate: edges of facets are now rounded, and small overlaps carry no constraint")
             iterate.rounded = True
             mixing.accelerated, window = None, ScatterWindow()
@@ -364,7 +364,7 @@ def newton_step(
         u[step.problem.contact_dofs] = v
         nodal = step.problem.displacement(u)
         for rows, part in parts:
-            forces, slips = part.along(nodal)
+            forces, slips = part.derivatives_along(nodal)
             gaps[: len(slips), rows] = slips
             force[: forces.size] += forces.ravel()
         merged = gaps if nodes is None else nodes.merged_gaps(gaps)

@@ -218,7 +218,7 @@ def prepared_heat(model: Model, ramp: Ramp, criteria: Criteria, linear_solver: s
     """Return the heat conduction of a checked model; None if the model does not conduct heat."""
     if not model.conducts:
         return None
-    conduction, merged_node, n = model.conduction(), model.same_temperature(), model.mesh.n_points
+    conduction, merged_node, n = model.conduction(), model.nodes_of_temperatures(), model.mesh.n_points
     merged = csr_array((np.ones(n), merged_node, np.arange(n + 1)), shape=(n, n))
     return Heat(
         model, ramp, criteria, conduction, conduction.matrix(), thermal_loads(model), merged, bodies(model.mesh)[1],

@@ -26,7 +26,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.model import gap_changes
 from fastcontact.model.pretension import loose_bolts_remark
-from fastcontact.model.rigid_motions import cone_rows, generalised, grouped, needed_friction, stopped_at
+from fastcontact.model.rigid_motions import cone_rows, generalised_forces, grouped_by_body, needed_friction, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION, SUM_ROUND_OFF
 
 # Number of times that contact displaces fluid from a node in a load step after which the node stays dry. At the front of the
@@ -111,7 +111,7 @@ def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapol
             assert part.nodal is not None
             last_active = iterate.active[name]
             last_active = last_active if extrapolation is None else extrapolation.active(name, last_active)
-            active = part.nodal.initially_active(part.gap0 + part.B @ iterate.u, iterate.pressure[name], last_active)
+            active = part.nodal.initial_active_set(part.gap0 + part.B @ iterate.u, iterate.pressure[name], last_active)
         sets.append(active)
     return np.concatenate(sets)
 
@@ -275,12 +275,12 @@ def _with_floating_bodies(
     if (u := problem.linearised_at) is not None:  # residual forces, since a loaded tangent resists rigid-body rotations
         force = force - problem.system.K @ bodies.strained(u)
     # Work of the loads in each free rigid-body motion, and the size of the model.
-    loads = generalised(bodies.motions, force, state.largest_rigid_force), model_size
+    loads = generalised_forces(bodies.motions, force, state.largest_rigid_force), model_size
     if not iterate.history:
         rows, gap0 = cone_rows(constraints)
         shift = stopped_at(rows @ modes, gap0 + rows @ iterate.u, *loads)
         if shift is None:
-            names = grouped(bodies.names)
+            names = grouped_by_body(bodies.names)
             text = f"the loads pull bodies away, and no contact stops them ({names}): reverse the loads or add supports"
             raise failure(text, smaller_steps_help=False)
         if not (active & ~constraints.equality).any():

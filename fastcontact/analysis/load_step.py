@@ -35,13 +35,13 @@ from fastcontact.analysis.thermal_coupling import (
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, largest
-from fastcontact.contact.cohesive_layer import Layer
+from fastcontact.contact.cohesive_layer import CohesiveLayer
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Pressure
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.model.pretension import section_results
-from fastcontact.model.rigid_motions import generalised
+from fastcontact.model.rigid_motions import generalised_forces
 from fastcontact.results.step import ContactResult, StepResult, by_largest_von_mises
 from fastcontact.results.units import units_of_results
 from fastcontact.round_off import SINGLE_PRECISION
@@ -116,7 +116,7 @@ def _end_of_step(
         bodies = solution.terms.bodies.at(u)
         end = replace(end, history=bodies.history)
         # In the first step, which begins without a history, the path is unknown.
-        if problem.bodies.flows_freely and load.rise is None and start.history:
+        if problem.bodies.halving_estimates_error and load.rise is None and start.history:
             displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
             size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
             end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))
@@ -167,7 +167,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         from_zero = largest(loaded.full_solution(zero))
         round_off = max(round_off, 16 * np.finfo(float).eps * from_zero)
     if problem.floating_bodies is not None:
-        forces = generalised(problem.floating_bodies.motions, load_as_force.force)
+        forces = generalised_forces(problem.floating_bodies.motions, load_as_force.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
@@ -234,8 +234,8 @@ def _contact_at_end(
             slip = np.where((contact.active & ~rigid_stick)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         contact = replace(contact, slip=slip, slip_total=slipped[name])
-        if isinstance(constraints.tied, Layer):
-            bonds[name] = constraints.tied.after(constraints, end.u)
+        if isinstance(constraints.tied, CohesiveLayer):
+            bonds[name] = constraints.tied.bond_after(constraints, end.u)
             contact = replace(contact, damage=bonds[name].at(contact.coordinates)[1])
         elif pair.options.kind not in ("tied", "gap_only"):
             before = start.forces.get(name)

@@ -214,7 +214,7 @@ class _Vibration:
         reduced = Reduced(system, M, contact.rows, contact.nodes)
         if n >= int(reduced.free.sum()):
             raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: request fewer")
-        solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], columns=True)
+        solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], needs_columns=True)
         solver.contrast = self.field.contrast
         free_nullspace = np.where(reduced.free[:, None], nullspace, 0.0)
         values, vectors = lowest(solver, (reduced.K, reduced.M), free_nullspace, reduced.free, n, self.shift)
@@ -249,7 +249,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
         if model.strain == "small":
             model.refuse_nonlinear("modes about a step are")
         deformation, rise = step.displacement, model.expanding_rise(temperature, step.temperature)
-        K = with_springs(bodies.at(deformation, bodies.beginning, rise=rise).K, model.springs)
+        K = with_springs(bodies.at(deformation, bodies.initial_history, rise=rise).K, model.springs)
     else:
         offset = model.stress_offset(temperature, initial, field, step.temperature)
         stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)

@@ -341,7 +341,7 @@ class _Newton:
         earlier ones is small, the next ratio, which is about the square of this one, may be that of the last iteration.
         """
         system, lift = problem.system, load.lift
-        scale = max(largest(system.right(load.force, lift)), self._start.largest_force)
+        scale = max(largest(system.right_side(load.force, lift)), self._start.largest_force)
         if problem.pairs or not problem.solver.iterative or scale == 0.0:
             return None
         missing = largest(system.displacement(system.unknowns(u, lift), lift) - u)  # prescribed displacements

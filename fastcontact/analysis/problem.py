@@ -25,7 +25,7 @@ from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.constrained_system import System
-from fastcontact.elasticity.following_pressure import FollowingPressure
+from fastcontact.elasticity.following_pressure import FollowerPressure
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.material_field import MaterialField
@@ -130,7 +130,7 @@ class Problem:
     bodies : NonlinearBodies, optional
         The solid cells, if they are nonlinear. `system` and `solver` then hold the tangent at zero displacements, or at
         `linearised_at`.
-    following : sequence of (FollowingPressure, ramp table)
+    following : sequence of (FollowerPressure, ramp table)
         Follower pressures. `forces` include their forces on the undeformed surface.
     heat : Heat, optional
         Heat conduction, if the model has any.
@@ -155,7 +155,7 @@ class Problem:
     initial_snapshot: Mapping[str, Any]
     warnings: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
-    following: Sequence[tuple[FollowingPressure, Table | None]] = ()
+    following: Sequence[tuple[FollowerPressure, Table | None]] = ()
     heat: Heat | None = None
     linearised_at: Array | None = None
 
@@ -281,7 +281,7 @@ class Problem:
             depth,
             state.bonds.get(name),
             load.fluids.get(name, 0.0),
-            linearised=None if self.linearised_at is None else self.displacement(self.linearised_at),
+            linearisation_point=None if self.linearised_at is None else self.displacement(self.linearised_at),
             friction_factor=load.friction_factors.get(name, 1.0),
         )
 
@@ -294,7 +294,7 @@ class Problem:
         [temperature].
         """
         assert self.bodies is not None
-        initial_history = start.history or self.bodies.beginning
+        initial_history = start.history or self.bodies.initial_history
         return self.bodies.at(self.displacement(u), initial_history, rise=rise, geometric=geometric, tangent=tangent)
 
     def initial_state(self) -> State:
@@ -336,7 +336,8 @@ def prepare(
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
         tolerance=choice.limited_tolerance(linear_tolerance, criteria.relative),
-        columns=not all(pair.eliminable for pair in pairs.values()), quadratic=linear_with_quadratic_cells(model),
+        needs_columns=not all(pair.eliminable for pair in pairs.values()),
+        has_quadratic_cells=linear_with_quadratic_cells(model),
     )  # fmt: skip
     field = model.material_field()
     solver.contrast = field.contrast
@@ -388,8 +389,8 @@ def linearised(
         may not converge for a tangent that is nearly singular.
     """
     K, model, floating = problem.force_driven.stiffness(K), problem.model, problem.floating_bodies
-    system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
-    solver, displacement = problem.solver.near(), problem.displacement(u)
+    system = problem.system.with_stiffness(K if contact is None else sum_of_blocks(K, contact))
+    solver, displacement = problem.solver.copy_for_similar_matrix(), problem.displacement(u)
     finite = problem.bodies and problem.bodies.finite
     if floating is not None and finite:
         motions = floating.motions
@@ -452,13 +453,13 @@ def _prepared_dofs(
     displacement : ndarray (n_points, dim)
         Displacements at which the near null space is computed [length].
     """
-    involved, matrix = system.involved(contact_dofs), system.matrix
+    involved, matrix = system.involved_unknowns(contact_dofs), system.matrix
     if bodies is not None:
         involved, matrix = np.union1d(involved, bodies.dofs), bodies.with_springs(matrix)
     modes = system.unknowns_of(model.force_driven.near_nullspace(near_nullspace(model, displacement)))
     retained = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
-        system.keep(retained)
+        system.set_matrix(retained)
     springs = np.empty(0, np.intp) if bodies is None else bodies.dofs
     return ActiveDofs(system, contact_dofs, springs, involved if model.contact and solver.condenses else None)
 

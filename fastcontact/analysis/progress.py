@@ -32,7 +32,7 @@ class StatusLine:
     def _compiling(self) -> None:
         if not self._reported:
             self._reported = True
-            self.draw(compiling.TEXT)
+            self.draw(compiling.ANNOUNCEMENT)
 
     def draw(self, text: str) -> None:
         """Replace the line."""

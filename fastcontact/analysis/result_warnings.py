@@ -31,7 +31,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
-from fastcontact.elasticity.mass import portions
+from fastcontact.elasticity.mass import cell_portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.elasticity.recovery import BATCH
@@ -102,7 +102,7 @@ def result_warnings(
             continue
         without_force = [] if name in clearances else _open_contact(problem, name, last, name in state.touched, loaded)
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
-        undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
+        undetermined = _undetermined_tractions(pair, contact, pair.nodes_with_undetermined_traction(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
         unresolved = list(_coarse_contact(pair, contact, state))
         if name in sag and not (unresolved and isinstance(pair.primary, RigidSide)):  # refinement also reduces the sag
@@ -366,7 +366,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     In linear kinematics it is half the curl of the displacement (n_points, dim).
     """
     square, point = 0.0, np.zeros(mesh.dim)
-    for name, rows in portions(mesh):
+    for name, rows in cell_portions(mesh):
         element, nodes = elements.get(name), mesh.cells[name][rows]
         centre = element.nodes[: element.n_corners].mean(axis=0)[None]
         slopes, _ = slopes_at(displacement[nodes], mesh.points[nodes], element.gradient(centre))
@@ -378,7 +378,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 def _open_clearances(problem: Problem, state: State) -> set[str]:
     """Return the names of automatically detected pairs that begin open and never close, such as a shank in its hole."""
-    gap_by_pair = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
+    gap_by_pair = {pair.name: pair.detected_gap for pair in problem.model.contact if pair.detected_gap is not None}
     if not state.touched & gap_by_pair.keys():
         return set()
     least_gap = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
@@ -498,7 +498,7 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
     others = _alternation_matrix(side)
     count = np.asarray(others.sum(axis=1)).ravel()
     closed = contact.active | ((others @ ~contact.active == 0) & (count > 0))
-    inside = closed & (side.beside @ ~closed == 0) & (count > 0)
+    inside = closed & (side.node_adjacency @ ~closed == 0) & (count > 0)
     if inside.sum() < MIN_NODES:
         return
     pressure, mean = contact.pressure[inside], (others @ contact.pressure)[inside] / count[inside]
@@ -516,12 +516,12 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
 
 def _oscillation_remedy(pair: Formulation, model: Model) -> str:
     """Return the remedy for oscillating pressures of a pair."""
-    from fastcontact.contact.found_contacts import SOFTER
+    from fastcontact.contact.found_contacts import NOTABLE_MODULUS_RATIO
 
     side, primary = pair.secondary, pair.primary
     if isinstance(primary, Surface):
         modulus, other = (_modulus(model, surface.points) for surface in (side, primary))
-        if modulus > SOFTER * other:
+        if modulus > NOTABLE_MODULUS_RATIO * other:
             return f"exchange the sides, since the body of '{primary.group}' is softer"
     if pair.name != "mortar":
         return "use formulation mortar"
@@ -560,12 +560,12 @@ def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: Contact
     plastic, side = last.cell_fields.get("plastic_strain"), pair.secondary
     if plastic is None or plastic.max(initial=0.0) < NOTABLE or pair.options.kind in ALWAYS_CLOSED:
         return
-    near_open = side.near @ (~contact.active & ~pair.excluded[side.points]) > 0
+    near_open = side.extended_adjacency @ (~contact.active & ~pair.excluded[side.points]) > 0
     weight = np.where(contact.active, lumped_areas(side, pair.points, pair.axisymmetric), 0.0)
     inside = contact.active & ~near_open
-    means = (side.near[inside] @ (weight * contact.pressure)) / (side.near[inside] @ weight)
+    means = (side.extended_adjacency[inside] @ (weight * contact.pressure)) / (side.extended_adjacency[inside] @ weight)
     mean, peak = float(means.max(initial=0.0)), contact.pressure.argmax()
-    if (side.near @ near_open)[peak] and contact.pressure_max > (1.0 + NEGLECTED) * mean > 0.0:
+    if (side.extended_adjacency @ near_open)[peak] and contact.pressure_max > (1.0 + NEGLECTED) * mean > 0.0:
         remedy = ", or formulation mortar" if pair.name != "mortar" and not isinstance(pair.primary, Surface) else ""
         yield (
             f"contact '{contact.name}': the largest nodal pressure, {contact.pressure_max:.4g}, is within four facets of "
@@ -580,7 +580,7 @@ def _alternation_matrix(side: Surface) -> csr_array:
 
     On quadratic facets they alternate between corners and other nodes, and on linear ones between any two.
     """
-    adjacency, kind = side.beside.tocoo(), np.arange(len(side.points))
+    adjacency, kind = side.node_adjacency.tocoo(), np.arange(len(side.points))
     if side.order == 2:
         kind[:] = 0
         for block in side.blocks:

@@ -17,7 +17,7 @@ from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.analysis.stages import next_stage, stage_of
 from fastcontact.errors import ModelError, warn
-from fastcontact.linear.choice import check_solver, check_tolerance, chosen
+from fastcontact.linear.choice import automatic_choice, check_solver, check_tolerance
 from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
@@ -149,7 +149,7 @@ def solve_steps(
     instants = restart.remaining(ramp, last)
     if not instants:
         return iter(())
-    ahead.expect(_kernel_sets(model, linear_solver))
+    ahead.request_helpers(_kernel_sets(model, linear_solver))
     model.check(ramp)
     prepare_model = partial(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
@@ -161,7 +161,7 @@ def solve_steps(
 def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
     """Return the keys of the table in `_jit.ahead` that lists the kernels to compile in advance for a model."""
     dim = model.mesh.dim
-    default = chosen(dim, model.mesh.n_points * dim, quadratic=linear_with_quadratic_cells(model))[0]
+    default, _ = automatic_choice(dim, model.mesh.n_points * dim, False, linear_with_quadratic_cells(model))
     multigrid = "amg" in (linear_solver, default if linear_solver == "auto" else "")
     return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
 

@@ -64,26 +64,26 @@ class Accuracy:
 Response = Callable[[Array, Array], Array]
 
 
-def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[Array], Array]) -> Response:
-    """Return the `Response` of a contact problem with q closed constraints.
+def response(loaded: Loaded, R: csr_array, place: Indices, forces_of: Callable[[Array], Array]) -> Response:
+    """Return the `Response` of a contact problem with q gaps and slips.
 
     Parameters
     ----------
     loaded : Loaded
         Prepared matrix (n, n) with any right-hand side.
-    R : csr_array ((1 + k) q, n)
-        Derivatives of the gaps of the closed constraints, and of their slips along k tangents [-].
-    rows : ndarray of int (q,)
-        Numbers of the closed constraints.
+    R : csr_array (q, n)
+        Derivatives of gaps and of slips [-].
+    place : ndarray of int (q,)
+        Their positions in arrays (1 + k, m) of the gaps and slips of all constraints.
     forces_of : callable
-        Function that returns the change ((1 + k) q,) of their normal and tangential forces [force], given a change
-        ((1 + k) q,) of their gaps and slips [length].
+        Function that returns the change (q,) of their normal and tangential forces [force], given a change (q,) of the gaps
+        and slips [length].
     """
     without_force, transpose = loaded.full_solution(np.zeros(R.shape[1])), csr_array(R.T)
 
     def respond(force: Array, gaps: Array) -> Array:
         u = loaded.full_solution(force) - without_force
-        return u + loaded.full_solution(transpose @ forces_of(R @ u + gaps[:, rows].ravel())) - without_force
+        return u + loaded.full_solution(transpose @ forces_of(R @ u + gaps.ravel()[place])) - without_force
 
     return respond
 

@@ -97,7 +97,7 @@ def _stage(
             relations.append(item)
         elif item.acts_from(begin):
             values[item.name] = np.asarray(stored.get(item.name, item.rows @ displacement.ravel()))
-            relations += item.after(values[item.name])
+            relations += item.begun_constraints(values[item.name])
     loads: list[Any] = []
     for load in model.heat_loads:
         if isinstance(load, FixedTemperature) and load.begins > -np.inf and load.acts_from(begin):

@@ -21,7 +21,7 @@ from fastcontact.analysis.heat import Heat, Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
-from fastcontact.contact.cohesive_layer import Layer
+from fastcontact.contact.cohesive_layer import CohesiveLayer
 from fastcontact.contact.conductance import heat_transfer
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -173,7 +173,7 @@ def _steady_temperatures(
             friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
     powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in conducting.items()}
-    fluxes = {name: conducting[name][1].over_whole_side(power) / conducting[name][4] for name, power in powers.items()}
+    fluxes = {name: conducting[name][1].side_pressure(power) / conducting[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return HeatSolution(steady.rise, steady.reaction, balance, fluxes)
 
@@ -195,7 +195,7 @@ def _normal_state(
     gap = np.maximum(constraints.gaps(configuration.displacement), 0.0)
     if wetted is not None:
         closed = closed & ~wetted.rows
-    elif isinstance(layer, Layer):  # adhesion conducts up to its strength, a cohesive layer until it is broken
+    elif isinstance(layer, CohesiveLayer):  # adhesion conducts up to its strength, a cohesive layer until it is broken
         closed = layer.damage == 0.0 if layer.law.reversible else layer.damage < 1.0
     elif pair.options.kind == "gap_only":
         closed, forces = np.zeros(len(gap), bool), np.zeros(len(gap))

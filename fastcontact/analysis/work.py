@@ -203,7 +203,7 @@ def contact_work(
     sliding = -0.5 * float(((tangential[0] + tangential[1]) * slips).sum())
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
-        displacement[pair.secondary.points] -= pair.rigid_motion(pair.at_nodes, configuration)
+        displacement[pair.secondary.points] -= pair.rigid_motion(pair.node_candidates, configuration)
     (work_after, energy_after), (work_before, energy_before) = (
         forces.normal_work(other, displacement) for forces, other in ((after, before), (before, after))
     )
@@ -322,7 +322,7 @@ def _forces(
     all_forces = np.column_stack([normal, tangents]).T
     amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
     added = np.zeros(len(contact.gap))
-    if pair.options.clearance is not None or configuration.worn is not None:
+    if pair.options.clearance is not None or configuration.wear_depth is not None:
         gap_alone = pair.nodal_gap(configuration, with_clearance=False)[0]
         np.subtract(contact.gap, gap_alone, out=added, where=np.isfinite(gap_alone) & np.isfinite(contact.gap))
     return ContactForces(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.arrays import REFUSAL, Array, is_masked
+from fastcontact.arrays import MASKED_ENTRIES, Array, is_masked
 from fastcontact.errors import ModelError, check_known
 
 # Largest magnitude of an input. Its cube is finite in double precision.
@@ -33,7 +33,7 @@ def number(name: str, value: object) -> float:
 def array(name: str, values: ArrayLike) -> Array:
     """Return `values` (...) [unit of the quantity] as floats (...) [unit of the quantity], or raise ModelError."""
     if is_masked(values):
-        raise ModelError(f"{name} {REFUSAL}")
+        raise ModelError(f"{name} {MASKED_ENTRIES}")
     try:
         converted = np.asarray(values)
     except ValueError:  # rows of different lengths

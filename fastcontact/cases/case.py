@@ -13,8 +13,9 @@ from fastcontact import analytic
 from fastcontact._tools import toml_text
 from fastcontact._tools.paths import existing_file, is_stream
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.cases import keys
 from fastcontact.cases.checks import Check, read_check
-from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
+from fastcontact.cases.keys import NUMBER, call_with_keys, check_keys, check_settings, errors_at, list_of_tables
 from fastcontact.cases.model_tables import LISTS, build_model, ramp_points
 from fastcontact.errors import CaseError, check_known, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
@@ -36,12 +37,12 @@ Label = tuple[str | int, ...]
 DECK_SUFFIX = ".inp"
 _PACKAGE = Path(__file__).resolve().parents[1]
 # Folders of the ready-made cases, in an installed package and in a checkout.
-_FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
+_CASE_FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 
 def ready_made_cases() -> dict[str, Path]:
     """Return the files of the ready-made cases by name, in alphabetical order."""
-    folder = next((folder for folder in _FOLDERS if folder.is_dir()), None)
+    folder = next((folder for folder in _CASE_FOLDERS if folder.is_dir()), None)
     return {} if folder is None else {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
@@ -52,34 +53,34 @@ def ready_made_case(name: str) -> Path:
     return cases[name]
 
 
-def case_path(given: str | Path) -> Path:
+def case_path(path_or_name: str | Path) -> Path:
     """Return the path of a case file that is given by its path or by the name of a ready-made case.
 
     A file of that name in the working directory takes precedence, and "-" stands for the standard input. Raises CaseError if
-    `given` is neither a path nor the name of a ready-made case.
+    `path_or_name` is neither a path nor the name of a ready-made case.
     """
-    path = Path(given)
+    path, text = Path(path_or_name), str(path_or_name)
     try:
-        if path.exists() or path.suffix or path.name != str(given):
+        if path.exists() or path.suffix or path.name != text:
             return path
         if path.name == "-":
             return Path("/dev/stdin")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise CaseError(f"cannot look for the case file '{str(given)[:200]}' ({reason}): check its name") from None
+        raise CaseError(f"cannot look for the case file '{text[:200]}' ({reason}): check its name") from None
     try:
         return ready_made_case(path.name)
     except CaseError as error:
-        raise CaseError(f"cannot read the case file '{given}': it does not exist, and {error}") from None
+        raise CaseError(f"cannot read the case file '{text}': it does not exist, and {error}") from None
 
 
-def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
+def referenced_files(data: dict[str, Any], folder: Path) -> Iterator[Path]:
     """Yield the files named in the parsed data of a case file, relative to `folder`, and the files that they include."""
     for key, value in data.items():
         entries = value if isinstance(value, list) else [value]
         for entry in entries:
             if isinstance(entry, dict):
-                yield from files_named(entry, folder)
+                yield from referenced_files(entry, folder)
             elif key == "file" and isinstance(entry, str):
                 path = folder / entry
                 yield from files_of(path) if path.is_file() else [path]
@@ -124,8 +125,9 @@ class Case:
     probes : dict of str to int
         Point number by probe name.
     theories : dict of str to dict
-        Theories by contact pair: ``"theory"`` and optionally ``"mesh_converged"`` are objects of `fastcontact.analytic`;
-        ``"share"`` is the modelled fraction of the theory's contact, for example 0.25 for a quarter.
+        Theories by contact pair, as dictionaries with the objects ``"theory"`` and optionally ``"mesh_converged"`` of
+        `fastcontact.analytic`, and with ``"share"``, the fraction [-] of the theory's contact that the model represents, for
+        example 0.25 for a quarter.
     checks : list of Check
         Comparisons with theories and documented values.
     units : dict of str to str
@@ -238,7 +240,7 @@ def files_of_case(path: str | Path) -> list[Path]:
         from fastcontact.cases.decks.blocks import files_of_deck
 
         return files_of_deck(existing_file(path))
-    return [path, *files_named(_read_toml(path)[1], path.parent)]
+    return [path, *referenced_files(_read_toml(path)[1], path.parent)]
 
 
 def _read_toml(path: Path) -> tuple[str, dict[str, Any]]:
@@ -281,7 +283,7 @@ def build_case(
     studies store `text`; if it is empty, a text is generated from the data. Raises CaseError if a key is unknown or a value
     is invalid, and FastcontactError if the mesh or the model is invalid.
     """
-    check_keys("", data, {**TOP, **dict.fromkeys(LISTS, list)})
+    check_keys("", data, {**keys.TOP_LEVEL, **dict.fromkeys(LISTS, list)})
     check_settings(data)
     for key in ("kinematics", "mesh", "material"):
         if key not in data:
@@ -299,7 +301,7 @@ def build_case(
     return Case(
         name=name,
         title=data.get("title", name),
-        text=text or _text(data),
+        text=text or _text_of(data),
         mesh=model.mesh,
         model=model,
         ramp=ramp,
@@ -310,7 +312,7 @@ def build_case(
         theories=theories,
         checks=[
             read_check(f"check[{i}]", entry, probes, pairs, theories, str(data["kinematics"]))
-            for i, entry in enumerate(tables("check", data.get("check", [])))
+            for i, entry in enumerate(list_of_tables("check", data.get("check", [])))
         ],
         units=known_units(model.units),
         approach=approach,
@@ -320,7 +322,7 @@ def build_case(
     )
 
 
-def _text(data: dict[str, Any]) -> str:
+def _text_of(data: dict[str, Any]) -> str:
     """Return the data as the text of a case file, or an empty text if TOML cannot represent them."""
     try:
         return toml_text.dump(data)
@@ -337,20 +339,20 @@ def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:
     """Return the quantities and the parameters of the tables ``[[sensitivity]]``."""
-    sensitivities, entries = [], tables("sensitivity", data.get("sensitivity", []))
+    sensitivities, entries = [], list_of_tables("sensitivity", data.get("sensitivity", []))
     if entries:
         from fastcontact.analysis.sensitivities import check_labels  # imports most of the solver
     for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
-        check_keys(where, entry, SENSITIVITY, SENSITIVITY)
+        check_keys(where, entry, keys.SENSITIVITY, keys.SENSITIVITY)
         labels = [entry["quantity"], *entry["by"]]
-        if not all(isinstance(label, list) and all(type(part) in (str, int) for part in label) for label in labels):
+        if not all(isinstance(label, list) and all(type(word) in (str, int) for word in label) for label in labels):
             raise CaseError(
                 f"{where}: 'quantity' must be a list such as [\"pressure_max\", \"PAIR\"], and 'by' a list of lists such as "
                 '[["E", "GROUP"]]'
             )
         quantity, *by = map(tuple, labels)
-        with at(where):
+        with errors_at(where):
             check_labels(model, quantity, by)
         sensitivities.append((quantity, by))
     return sensitivities
@@ -368,12 +370,12 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     name = data["generator"]
     check_known("mesh.generator", name, GENERATORS, CaseError)
     arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items() if key != "generator"}
-    return called("mesh", GENERATORS[name], arguments)
+    return call_with_keys("mesh", GENERATORS[name], arguments)
 
 
 def _ramp(data: dict[str, Any]) -> Ramp:
-    """Return the load steps of the table ``[ramp]``."""
-    check_keys("ramp", data, RAMP)
+    """Return the load steps of the table ``[ramp]``, by default 20 equal steps."""
+    check_keys("ramp", data, keys.RAMP)
     if "instants" not in data:
         if "table" in data:
             table = ramp_points(data["table"])
@@ -394,7 +396,7 @@ def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
     for name, group in data.items():
         if not isinstance(group, str):
             raise CaseError(f"'probes.{name}' must be the name of a group of one point, not {group!r}")
-        with at(f"probes.{name}"):
+        with errors_at(f"probes.{name}"):
             points_of_probes[name] = mesh.point(group)
     return points_of_probes
 
@@ -436,7 +438,7 @@ def _theory(where: str, data: dict[str, Any], kinematics: str) -> Any:
     check_known(f"{where}.kind", kind, analytic.THEORIES, CaseError)
     if kinematics.startswith("plane_") and "kinematics" in inspect.signature(analytic.THEORIES[kind]).parameters:
         arguments = {"kinematics": kinematics, **arguments}
-    return called(where, analytic.THEORIES[kind], arguments)
+    return call_with_keys(where, analytic.THEORIES[kind], arguments)
 
 
 def stored_description(data: dict[str, Any]) -> dict[str, Any]:

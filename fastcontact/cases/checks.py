@@ -29,7 +29,7 @@ REQUIRED_OPTIONS = {
 }
 
 
-def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
+def contact_at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
     """Return the last contact with a point on its secondary side, and the row of the point, or None if there is none."""
     for contact in reversed(step.contact.values()):
         rows = np.flatnonzero(contact.points == point)
@@ -48,7 +48,7 @@ def _contact_field(field: str) -> Callable[[StepResult, int], float]:
     """Return a function of step and point: the magnitude of a contact field; NaN if the point is on no secondary side."""
 
     def value(step: StepResult, point: int) -> float:
-        contact, row = at_point(step, point) or (None, 0)
+        contact, row = contact_at_point(step, point) or (None, 0)
         return math.nan if contact is None else float(np.linalg.norm(getattr(contact, field)[row]))
 
     return value
@@ -59,8 +59,8 @@ def _component(vector: Callable[..., Any], index: int) -> Callable[..., Any]:
     return lambda *arguments: vector(*arguments)[index]
 
 
-# Quantities of a contact pair: the kind of unit, and the function that returns the quantity, or None if undefined.
-OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
+# Quantities of a contact pair: the kind of unit, and the function that returns the quantity, or None if it is undefined.
+PAIR_QUANTITIES: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "force": ("force", lambda contact: np.linalg.norm(contact.force)),
     "pressure_max": ("pressure", lambda contact: contact.pressure_max),
     "radius": ("length", lambda contact: _bracket_midpoint(contact.radius)),
@@ -72,7 +72,7 @@ OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     **{f"moment.{axis}": ("moment", _component(contact_moment, i)) for axis, i in {**_AXES, "z": -1}.items()},
 }  # fmt: skip
 # Quantities of a probe: the kind of unit, and the function that returns the quantity at a point in a step.
-OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
+PROBE_QUANTITIES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
     "pressure": ("pressure", _contact_field("pressure")),
     "shear": ("pressure", _contact_field("shear")),
     "von_mises": ("pressure", lambda step, point: step.von_mises[point]),
@@ -85,7 +85,7 @@ OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
 
 def kind_of_unit(quantity: str) -> str | None:
     """Return the kind of the unit of a quantity such as ``"PAIR.force"`` or ``"PROBE.stress.yy"``; None if it is unknown."""
-    return {**OF_PROBES, **OF_PAIRS}.get(quantity.partition(".")[2], (None,))[0]
+    return {**PROBE_QUANTITIES, **PAIR_QUANTITIES}.get(quantity.partition(".")[2], (None,))[0]
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class Check:
         number = float(attrgetter(self.of)(theory))
         return -number if ".stress." in self.quantity and self.theory else number
 
-    def described(self) -> str:
+    def description(self) -> str:
         """Return a one-line description of the comparison."""
         source = f" ({self.source})" if self.source else ""
         against = f"the theory's {self.of}" if self.theory else f"{self.value:g}{source}"
@@ -160,7 +160,7 @@ def read_check(
         raise CaseError(f"{where} needs either 'theory', the name of a contact pair with a theory, or 'value'")
     owner, _, field = entry["quantity"].partition(".")
     check_known(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs], CaseError)
-    quantities = defined(OF_PROBES if owner in probes else OF_PAIRS, kinematics)
+    quantities = defined_names(PROBE_QUANTITIES if owner in probes else PAIR_QUANTITIES, kinematics)
     check_known(f"quantity in {where}", field, quantities, CaseError)
     if owner in pairs and field in REQUIRED_OPTIONS and REQUIRED_OPTIONS[field][0] not in pairs[owner]:
         raise CaseError(f"{where}: '{owner}' has no {field}: {REQUIRED_OPTIONS[field][1]}")
@@ -189,7 +189,7 @@ def read_check(
     return check
 
 
-def defined(names: Collection[str], kinematics: str) -> list[str]:
+def defined_names(names: Collection[str], kinematics: str) -> list[str]:
     """Return those `names` of quantities that the kinematics define; plane models have no force along z."""
     omitted: tuple[str, ...] = () if kinematics == "3d" else ONLY_IN_3D
     if kinematics == "axisymmetric":  # moments and radial forces cancel over the circle
@@ -209,26 +209,26 @@ def check_target(where: str, check: Check, theory: Any) -> None:
         raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so the relative deviation is undefined")
 
 
-def measured(quantity: str, step: StepResult, probes: Mapping[str, int]) -> float:
+def quantity_value(quantity: str, step: StepResult, probes: Mapping[str, int]) -> float:
     """Return a quantity, such as ``"PAIR.force"``, in a step; NaN if it is undefined, such as wear without contact."""
     owner, _, field = quantity.partition(".")
     if owner in probes:
-        value = OF_PROBES[field][1](step, probes[owner])
+        value = PROBE_QUANTITIES[field][1](step, probes[owner])
     elif field == "heat":
         value = step.heat.get("contacts", {}).get(owner)
     else:
-        value = OF_PAIRS[field][1](step.contact[owner])
+        value = PAIR_QUANTITIES[field][1](step.contact[owner])
     return math.nan if value is None else float(value)
 
 
-def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:
+def outcome(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:
     """Return the entry of a check in the summary: value, target, relative deviation [-], and whether the check passed.
 
     If the case states a mesh-converged solution, the entry includes the deviation of the value from this solution and the
     deviation of this solution from the theory.
     """
     theory = theories[check.theory] if check.theory else {}
-    value, target = check.factor * measured(check.quantity, step, probes), check.target(theory.get("theory"))
+    value, target = check.factor * quantity_value(check.quantity, step, probes), check.target(theory.get("theory"))
     solution = theory.get("mesh_converged")
     mesh_converged = check.target(solution) if hasattr(solution, check.of) else None
     return {

@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 import inspect
 import re
+import reprlib
 import types
 import typing
 from collections import abc
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from reprlib import repr
 from typing import Any
 
 from fastcontact._tools.argument_types import types_of
@@ -42,6 +42,7 @@ def keys_of(function: Callable[..., Any]) -> dict[str, tuple[type, ...]]:
 
 # Message of `fastcontact._tools.argument_types` about an argument of a wrong type.
 _ARGUMENT = re.compile(r"the argument (?P<key>\w+) of [\w.]+ must be (?P<kinds>.*), not (?P<given>.*)")
+# Keys of the tables of a case file, with the TOML types of their values.
 AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
@@ -69,7 +70,7 @@ STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
     "parameters": (dict, 'a table of expressions by path, { "material[0].E" = "value" }'),
 }
 MODES: dict[str, Any] = {"n": int, "stress_stiffening": bool, "hold_sliding": bool, "nodal_diameters": (int, str, list)}
-TOP: dict[str, Any] = {
+TOP_LEVEL: dict[str, Any] = {
     "title": str,
     "kinematics": str,
     "strain": str,
@@ -87,7 +88,7 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterab
     The values must have the types in `known`. The type None admits any value.
     """
     if not isinstance(data, dict):
-        raise CaseError(f"'{where}' must be a table of keys, not {repr(data)}")
+        raise CaseError(f"'{where}' must be a table of keys, not {reprlib.repr(data)}")
     for key, value in data.items():
         label = f"{where}.{key}" if where else key
         if key not in known:
@@ -97,7 +98,7 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterab
             if kinds == (list,) and isinstance(value, dict):
                 raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
             names = " or ".join(kind.__name__ for kind in kinds)
-            raise CaseError(f"the value of '{label}' must be of type {names}, not {repr(value)}")
+            raise CaseError(f"the value of '{label}' must be of type {names}, not {reprlib.repr(value)}")
     for key in required:
         if key not in data:
             raise CaseError(f"{where} needs '{key}'")
@@ -122,7 +123,7 @@ def check_settings(data: Mapping[str, Any]) -> None:
                 raise CaseError(f"'{where}' must be {form}, not {entry!r}")
 
 
-def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
+def call_with_keys(where: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
     """Return the result of `function` with the keys of the table `where` of a case file as arguments.
 
     Raises CaseError if a key is unknown or missing, or if the function rejects the type or the value of a key.
@@ -134,14 +135,14 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
     try:
         return function(**arguments)
     except (TypeError, ValueError) as error:
-        values = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
+        values = ", ".join(f"{key} = {reprlib.repr(value)}" for key, value in arguments.items())
         raise CaseError(f"'{where}': {values} are invalid ({error})") from error
     except FastcontactError as error:
-        raise CaseError(_message_of_key(where, str(error)) or f"'{where}': {error}") from error
+        raise CaseError(_message_about_key(where, str(error)) or f"'{where}': {error}") from error
 
 
 @contextlib.contextmanager
-def at(where: str) -> Iterator[None]:
+def errors_at(where: str) -> Iterator[None]:
     """Prefix the messages of errors raised in a ``with`` block with the table of the case file that causes them."""
     try:
         yield
@@ -150,12 +151,12 @@ def at(where: str) -> Iterator[None]:
     except FastcontactError as error:
         if where.replace(".", " '", 1) + "'" in str(error):  # the message names the table
             raise
-        if message := _message_of_key(where, str(error)):
+        if message := _message_about_key(where, str(error)):
             raise CaseError(message) from error
         raise type(error)(f"{where}: {error}") from error
 
 
-def _message_of_key(where: str, text: str) -> str:
+def _message_about_key(where: str, text: str) -> str:
     """Return a message about an argument of a function as a message about a key, or an empty string for other messages."""
     match = _ARGUMENT.fullmatch(text)
     if match is None:
@@ -164,7 +165,7 @@ def _message_of_key(where: str, text: str) -> str:
     return f"the value of '{where}.{match['key']}' must be {kinds}, not {match['given']}"
 
 
-def tables(where: str, entries: Any) -> list[dict[str, Any]]:
+def list_of_tables(where: str, entries: Any) -> list[dict[str, Any]]:
     """Return `entries`. Raises CaseError if they are not a list of tables."""
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise CaseError(f"'{where}' must be a list of tables: write [[{where}]] above each")

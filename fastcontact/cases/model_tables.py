@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 import inspect
+import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from reprlib import repr
 from typing import TYPE_CHECKING, Any
 
 from fastcontact._tools.argument_types import types_of
-from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables, toml_types
+from fastcontact.cases import keys
+from fastcontact.cases.keys import NUMBER, call_with_keys, check_keys, errors_at, list_of_tables, toml_types
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from fastcontact.contact.obstacles import Obstacle
 
 # Keys whose values may depend on the position.
-VALUES = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coefficient", "ambient", *COMPONENTS)
+VARYING = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coefficient", "ambient", *COMPONENTS)
 
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
@@ -84,7 +85,7 @@ NONLINEAR: dict[str, type[Material]] = {
     "ogden": Ogden,
 }
 # Descriptions of materials by law, for messages.
-_LAWS: dict[type[Material], str] = {
+_LAW_DESCRIPTIONS: dict[type[Material], str] = {
     LinearElastic: "an isotropic material",
     Orthotropic: "an orthotropic material (E, nu and G are lists of three)",
     Anisotropic: "an anisotropic material (D is a matrix)",
@@ -92,10 +93,10 @@ _LAWS: dict[type[Material], str] = {
 }
 
 
-def _constants() -> dict[str, tuple[type, ...]]:
+def _material_keys() -> dict[str, tuple[type, ...]]:
     """Return the TOML types of the keys of all material laws, in the order in which messages list them."""
     known: dict[str, set[type]] = {}
-    for law in _LAWS:
+    for law in _LAW_DESCRIPTIONS:
         parameters = inspect.signature(law).parameters
         for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
             if key in parameters:
@@ -141,9 +142,9 @@ def _keys(*functions: Callable[..., None], **extra: Any) -> tuple[dict[str, Any]
         for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # the first parameter is the model
             kinds = toml_types(annotations[key])
             if parameter.kind is parameter.VAR_KEYWORD:
-                known |= dict.fromkeys(COMPONENTS, kinds) if key == "tensor_components" else AXES
+                known |= dict.fromkeys(COMPONENTS, kinds) if key == "tensor_components" else keys.AXES
             else:
-                known[key] = kinds if key in (*VALUES, "axes") else tuple(kind for kind in kinds if kind is not dict)
+                known[key] = kinds if key in (*VARYING, "axes") else tuple(kind for kind in kinds if kind is not dict)
                 required += [key] * (parameter.default is parameter.empty)
     return {**known, **extra}, required
 
@@ -153,7 +154,7 @@ def keys_of_list(kind: str) -> tuple[dict[str, Any], Sequence[str]]:
     """Return the TOML types of the keys of the tables of a kind, one of `LISTS`, and their required keys."""
     if kind == "material":  # its required keys depend on the law
         others = {"groups": (list, str), "law": str, "D": list, "hardening": list}
-        return _constants() | others | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)), ()
+        return _material_keys() | others | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)), ()
     if kind == "temperature":  # it needs either a value or a file
         return _keys(Model.add_temperature, Model.add_temperature_file)[0], ()
     extra: dict[str, Any] = {"coupling": {"place": list}, "support": {"rotation": dict}}
@@ -162,7 +163,7 @@ def keys_of_list(kind: str) -> tuple[dict[str, Any], Sequence[str]]:
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     """Return the model of the parsed `data` of a case file; paths in the data are relative to `folder`."""
-    mesh = _add_references(_cut_along(mesh, data.get("pretension", [])), data.get("coupling", []))
+    mesh = _add_references(_cut_sections(mesh, data.get("pretension", [])), data.get("coupling", []))
     model = Model(
         mesh,
         data["kinematics"],
@@ -182,7 +183,7 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
 def _add_lists(model: Model, data: dict[str, Any], folder: Path, functions: Mapping[str, Callable[..., None]]) -> None:
     """Add the entries of the lists of tables to a model by the `functions`. Raises CaseError if an entry is invalid."""
     for kind, add in functions.items():
-        for i, entry in enumerate(tables(kind, data.get(kind, []))):
+        for i, entry in enumerate(list_of_tables(kind, data.get(kind, []))):
             where, (known, required) = f"{kind}[{i}]", keys_of_list(kind)
             if kind == "material":
                 check_keys(where, entry, known)
@@ -190,19 +191,19 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, functions: Mapp
                 constants = inspect.signature(law).parameters
                 for key in entry:
                     if key not in ("groups", "law") and key not in constants:
-                        raise CaseError(f"the key '{where}.{key}' does not belong to {_LAWS[law]}")
+                        raise CaseError(f"the key '{where}.{key}' does not belong to {_LAW_DESCRIPTIONS[law]}")
                 required = [key for key, parameter in constants.items() if parameter.default is parameter.empty]
             check_keys(where, entry, known, required)
-            with at(where):
+            with errors_at(where):
                 values = _read_fields(where, entry, model.mesh, folder) if kind == "material" else entry
-                add(model, **_arguments(where, _resolve(folder, _convert(where, values, VALUES, _interpolant))))
+                add(model, **_arguments(where, _resolve(folder, _convert(where, values, VARYING, _interpolant))))
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
     """Add the contact pairs of a case file, and then the automatically detected pairs if the file requests them."""
     pairs = data.get("contact", {})
     if isinstance(pairs, str) and pairs != "auto":
-        raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {repr(pairs)}")
+        raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {reprlib.repr(pairs)}")
     for name, entry in pairs.items() if isinstance(pairs, dict) else ():
         if not isinstance(entry, dict):
             raise CaseError(
@@ -210,12 +211,12 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
             )
         for key in ("secondary", "primary"):
             if not isinstance(entry.get(key), str):
-                hint = "".join(f"; rename '{other}' to '{key}'" for other in entry if OTHER_WORDS.get(other) == key)
+                hint = "".join(f"; rename '{word}' to '{key}'" for word in entry if OTHER_WORDS.get(word) == key)
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets{hint}")
-        with at(f"contact.{name}"):
+        with errors_at(f"contact.{name}"):
             model.add_contact(name, **entry)
     if pairs == "auto" or "contacts" in data:
-        with at("contacts"):
+        with errors_at("contacts"):
             model.add_contacts(**data.get("contacts", {}))
 
 
@@ -225,7 +226,7 @@ def _read_fields(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) ->
     def read(name: str, value: Any) -> Any:
         if not (isinstance(value, dict) and "file" in value):
             return value
-        check_keys(name, value, FIELD)
+        check_keys(name, value, keys.FIELD)
         if "field" not in value:
             raise CaseError(f"'{name}' needs 'field', the name of the field in the file")
         from fastcontact.mesh.files.mesh_fields import read_field
@@ -236,14 +237,14 @@ def _read_fields(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) ->
 
 
 def _convert(
-    where: str, entry: dict[str, Any], keys: Sequence[str], convert: Callable[[str, Any], Any]
+    where: str, entry: dict[str, Any], names: Sequence[str], convert: Callable[[str, Any], Any]
 ) -> dict[str, Any]:
-    """Return an entry with `convert` applied to the values of `keys`, and to each member of a list.
+    """Return an entry with `convert` applied to the values of the keys `names`, and to each member of a list.
 
     The arguments of `convert` are the location of the value in the case file, for messages, and the value.
     """
     values = dict(entry)
-    for key in (key for key in keys if key in entry):
+    for key in (name for name in names if name in entry):
         value = entry[key]
         if isinstance(value, list):
             values[key] = [convert(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
@@ -260,35 +261,35 @@ def _resolve(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     if isinstance(file, str):
         return {**entry, "file": folder / file}
     if not all(isinstance(name, str) for name in file):
-        raise CaseError(f"'file' must be a path or a list of paths, not {repr(file)}")
+        raise CaseError(f"'file' must be a path or a list of paths, not {reprlib.repr(file)}")
     return {**entry, "file": [folder / name for name in file]}
 
 
 def _interpolant(where: str, value: Any) -> Any:
     """Return the function that interpolates `value`, a table of values by position; return other values unchanged."""
-    return called(where, Tabulated, value) if isinstance(value, dict) else value
+    return call_with_keys(where, Tabulated, value) if isinstance(value, dict) else value
 
 
-def _cut_along(mesh: Mesh, sections: Any) -> Mesh:
+def _cut_sections(mesh: Mesh, sections: Any) -> Mesh:
     """Return the mesh cut along those pretension sections that have no opposite side yet."""
-    for i, entry in enumerate(tables("pretension", sections)):
+    for i, entry in enumerate(list_of_tables("pretension", sections)):
         name = entry.get("section")
         if isinstance(name, str) and "opposite" not in entry and name + OPPOSITE not in mesh.group_names:
             from fastcontact.mesh.generate.cut import cut
 
-            with at(f"pretension[{i}]"):
+            with errors_at(f"pretension[{i}]"):
                 mesh = cut(mesh, name, entry.get("normal"))
     return mesh
 
 
 def _add_references(mesh: Mesh, couplings: Any) -> Mesh:
     """Return the mesh with the reference points of those couplings that state a `place`."""
-    for i, entry in enumerate(tables("coupling", couplings)):
+    for i, entry in enumerate(list_of_tables("coupling", couplings)):
         name, coordinates = entry.get("reference"), entry.get("place")
         if isinstance(name, str) and isinstance(coordinates, list):
             from fastcontact.mesh.generate.transform import with_reference_points
 
-            with at(f"coupling[{i}]"):
+            with errors_at(f"coupling[{i}]"):
                 mesh = with_reference_points(mesh, {name: coordinates})
     return mesh
 
@@ -301,12 +302,12 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     options = {key: value for key, value in entry.items() if key != "shape"}
     shape = entry.get("shape")
     if shape == "mesh":  # then the arguments of the shape are keys of the obstacle
-        shape = {"kind": "mesh", **{key: options.pop(key) for key in SURFACE if key in options}}
+        shape = {"kind": "mesh", **{key: options.pop(key) for key in keys.SURFACE if key in options}}
     obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
     for key in ("motion", "force"):
         if key in options:
-            check_keys(f"{where}.{key}", options[key], AXES)
-    with at(where):
+            check_keys(f"{where}.{key}", options[key], keys.AXES)
+    with errors_at(where):
         model.add_obstacle(name, obstacle=obstacle, **_arguments(where, options))
 
 
@@ -319,16 +320,16 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
         raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))
     if not isinstance(shape, dict):
         required = [key for key, p in inspect.signature(SHAPES[kind]).parameters.items() if p.default is p.empty]
-        others = "".join(f", {key} = ..." for key in required)
-        raise CaseError(f"'{where}' is a table: write {{ kind = \"{kind}\"{others} }}")
+        arguments_text = "".join(f", {key} = ..." for key in required)
+        raise CaseError(f"'{where}' is a table: write {{ kind = \"{kind}\"{arguments_text} }}")
     arguments: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in shape.items() if k != "kind"}
     if kind == "mesh":
-        check_keys(where, arguments, SURFACE)
+        check_keys(where, arguments, keys.SURFACE)
         if "group" not in arguments:
             raise CaseError(f"'{where}' needs 'group', the facets of the rigid surface")
         file = arguments.pop("file", None)
         return MeshedSurface(mesh if file is None else read_mesh(folder / file), **arguments)
-    obstacle: Obstacle = called(where, SHAPES[kind], arguments)
+    obstacle: Obstacle = call_with_keys(where, SHAPES[kind], arguments)
     return obstacle
 
 
@@ -339,9 +340,9 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     """
     arguments = {key: value for key, value in entry.items() if key != "place"}  # `_add_references` has read the place
     if isinstance(entry.get("axes"), dict):
-        arguments["axes"] = called(f"{where}.axes", CylindricalAxes, entry["axes"])
+        arguments["axes"] = call_with_keys(f"{where}.axes", CylindricalAxes, entry["axes"])
     if "rotation" in entry:
-        check_keys(f"{where}.rotation", entry["rotation"], ROTATION)
+        check_keys(f"{where}.rotation", entry["rotation"], keys.ROTATION)
         arguments["rotation"] = _arguments(f"{where}.rotation", entry["rotation"])
     if "ramp" in entry:
         arguments["ramp"] = ramp_points(entry["ramp"], f"{where}.ramp")
@@ -349,7 +350,7 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
         kinds: list[Any] = [(str, int), str, NUMBER]
         if not isinstance(term, list) or len(term) != 3 or not all(map(isinstance, term, kinds)):
             raise CaseError(
-                f"'{where}.terms' must be a list of [group or point, component, coefficient], not {repr(term)}"
+                f"'{where}.terms' must be a list of [group or point, component, coefficient], not {reprlib.repr(term)}"
             )
     return arguments
 

@@ -10,9 +10,9 @@ import numpy as np
 from fastcontact._tools.versions import versions
 from fastcontact.analysis.resultants import contact_resultants
 from fastcontact.cases.case import Case, Label
-from fastcontact.cases.checks import at_point, evaluated
+from fastcontact.cases.checks import contact_at_point, outcome
 from fastcontact.errors import ModelError
-from fastcontact.model.rigid_motions import grouped
+from fastcontact.model.rigid_motions import grouped_by_body
 from fastcontact.results.step import ContactResult, StepResult, force_text
 from fastcontact.results.units import units_of_results, value_text, with_unit
 
@@ -35,8 +35,8 @@ def summarise(
 ) -> dict[str, Any]:
     """Return the summary of a run, which contains only numbers, strings, lists and dictionaries, as JSON requires.
 
-    `last` is the last step. `steps` contains the result of `of_step` for each step. `modes` contains the vibration modes at
-    the last step if the case requests them.
+    `last` is the last step. `steps` contains the `step_entry` of each step. `modes` contains the vibration modes at the last
+    step if the case requests them.
     """
     mesh = case.mesh
     peak = int(np.argmax(last.von_mises))
@@ -64,7 +64,7 @@ def summarise(
         "sensitivities": [_sensitivity(case, last, *sensitivity) for sensitivity in case.sensitivities],
         "regularised": last.iterations.get("regularised"),
         **({} if modes is None else {"modes": _modes(modes)}),
-        "checks": [evaluated(check, last, case.probes, case.theories) for check in case.checks],
+        "checks": [outcome(check, last, case.probes, case.theories) for check in case.checks],
         "timings": dict(timings),
         "versions": versions(),
         "warnings": list(warnings),
@@ -99,7 +99,7 @@ def _modes(modes: Modes) -> dict[str, Any]:
     return {**table, "nodal_diameters": modes.nodal_diameters.tolist(), "twins": modes.twins.tolist()}
 
 
-def of_step(step: StepResult) -> dict[str, Any]:
+def step_entry(step: StepResult) -> dict[str, Any]:
     """Return the entry of a step in the summary: load factor, numbers of iterations, work [energy] and pretension."""
     counts = ("geometry_updates", "active_set_iterations", "linear_iterations")
     summary = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
@@ -161,7 +161,7 @@ def _bounds(values: Any) -> list[float]:
 
 def _probe(step: StepResult, point: int) -> dict[str, Any]:
     """Return the results at a probe; stresses by material are included only on interfaces between materials."""
-    contact, row = at_point(step, point) or (None, 0)
+    contact, row = contact_at_point(step, point) or (None, 0)
     by_material = step.material_stress.at(point) if step.material_stress is not None else {}
     material_stresses = {str(number): stress.tolist() for number, stress in by_material.items()}
     return {
@@ -201,7 +201,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     """Return the summary as lines of text."""
     units = summary["units"]
     steps = summary["steps"]
-    rows = [
+    texts = [
         f"{summary['title']}",
         f"  {summary['mesh']['n_points']} points, {summary['n_dofs']} degrees of freedom, {count(len(steps), 'load step')}, "
         f"{sum(s['active_set_iterations'] for s in steps)} active-set iterations, "
@@ -209,44 +209,44 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     ]
     if substeps := [len(s["substeps"]) for s in steps if "substeps" in s]:
         steps_text = count(len(substeps), "load step")
-        rows.append(f"  {steps_text} did not converge as a whole, and took {sum(substeps)} substeps instead")
+        texts.append(f"  {steps_text} did not converge as a whole, and took {sum(substeps)} substeps instead")
     peak = summary["von_mises_max"]
     loaded = peak["value"] > 0.0 or "heat" not in summary  # heat conduction alone has no forces
     for name, contact in summary["contact"].items() if loaded else ():
-        rows += _contact_lines(name, contact, units)
+        texts += _contact_lines(name, contact, units)
     for name, section in steps[-1].get("pretension", {}).items():
-        rows.append(
+        texts.append(
             f"  pretension '{name}': force {value_text(section['force'], units, 'force', 6)}, shortened by "
             + value_text(section["shortening"], units, "length", 6)
         )
     if loaded:
         position = ", ".join(f"{x:.4g}" for x in peak["at"])
-        rows.append(
+        texts.append(
             f"  largest von Mises stress {value_text(peak['value'], units, 'pressure', 6)} at "
             + with_unit(f"({position})", units, "length")
         )
     for name, (low, high) in summary.get("cell_fields", {}).items():
-        rows.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
+        texts.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
     if heat := summary.get("heat"):
         powers = ", ".join(f"{name} {heat[name]:.4g}" for name in ("loads", "films", "friction"))
         supports = f"prescribed temperatures {heat['inflow']:.6g} in, {heat['inflow'] - heat['supports']:.6g} out"
         contacts = "".join(f"; across '{name}' {power:.6g}" for name, power in heat["contacts"].items())
         temperatures = "temperatures from {:.6g} to {:.6g}".format(*heat["temperature"])
-        rows.append(f"  {temperatures}; heat into the bodies by {supports}, {powers}{contacts}")
+        texts.append(f"  {temperatures}; heat into the bodies by {supports}, {powers}{contacts}")
     if report := summary["regularised"]:
-        rows.append(
-            f"  held by contact alone: {grouped(report['motions'])}. Regularised by springs of "
+        texts.append(
+            f"  held by contact alone: {grouped_by_body(report['motions'])}. Regularised by springs of "
             f"{value_text(report['spring_stiffness'], units, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} "
             "of the load at the end"
         )
     for name, theory in summary["theory"].items():
-        rows += _theory_lines(name, theory, summary["contact"][name]["extent"])
-    rows += map(_sensitivity_line, summary["sensitivities"])
+        texts += _theory_lines(name, theory, summary["contact"][name]["extent"])
+    texts += map(_sensitivity_line, summary["sensitivities"])
     if "modes" in summary:
-        rows += _mode_lines(summary["modes"])
+        texts += _mode_lines(summary["modes"])
     for check in summary["checks"]:
-        rows += _check_lines(check, units)
-    return rows
+        texts += _check_lines(check, units)
+    return texts
 
 
 def _mode_lines(table: Mapping[str, Any]) -> Iterator[str]:
@@ -255,7 +255,7 @@ def _mode_lines(table: Mapping[str, Any]) -> Iterator[str]:
     diameters = table.get("nodal_diameters", [None] * len(frequencies))
     twins = table.get("twins", range(len(frequencies)))
     for d in dict.fromkeys(diameters):
-        modes = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
+        modes = [k for k, diameter in enumerate(diameters) if diameter == d and k <= twins[k]]
         values = ", ".join(f"{frequencies[k]:.6g}" for k in modes)
         pairs = ", each of two modes" if any(twins[k] > k for k in modes) else ""
         family = "" if d is None else f", {count(d, 'nodal diameter')}{pairs}"
@@ -335,9 +335,9 @@ def _check_lines(check: Mapping[str, Any], units: Mapping[str, str]) -> Iterator
     """Yield the result of a check, and an explanation if the theory rather than the mesh causes its failure."""
     verdict = "within" if check["passed"] else "NOT within"
     origin = "the theory's" if check["of"] else "the documented"
-    measured = value_text(check["value"], units, check["unit"], 6)
+    value = value_text(check["value"], units, check["unit"], 6)
     text = (
-        f"  check {check['name']}: {measured} is {abs(check['deviation']):.3%} from {origin} "
+        f"  check {check['name']}: {value} is {abs(check['deviation']):.3%} from {origin} "
         f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"
     )
     model_error = check["mesh_converged_deviation"]

@@ -175,7 +175,7 @@ def _run(words: list[str]) -> int:
 def _say_compiling() -> None:
     """Print once that kernels are being compiled."""
     compiling.listeners.remove(_say_compiling)
-    say(f"{compiling.TEXT} ...", error=True)
+    say(f"{compiling.ANNOUNCEMENT} ...", error=True)
 
 
 def _notes(error: BaseException) -> list[str]:

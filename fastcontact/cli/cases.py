@@ -49,7 +49,7 @@ def _lines(path: Path) -> list[str]:
     return [
         f"{case.name}: {case.title}",
         f"    {kinematics}, {n_solids} {', '.join(case.mesh.solids)}, {count(len(case.ramp), 'load step')}",
-        *(f"    checks {check.described()}" for check in case.checks),
+        *(f"    checks {check.description()}" for check in case.checks),
     ]
 
 

@@ -135,7 +135,7 @@ def _write_steps(
     """
     from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
-    from fastcontact.cases.summary import of_step
+    from fastcontact.cases.summary import step_entry
     from fastcontact.results.writer import ResultWriter
 
     if options.estimate_error:
@@ -145,7 +145,7 @@ def _write_steps(
     with ResultWriter(output, case.model, case_text=case.text, **settings) as writer:
         _check_same_case(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
-        done = [(of_step(step), step.warnings) for step in writer.done]  # reads each step only once
+        done = [(step_entry(step), step.warnings) for step in writer.done]  # reads each step only once
         steps = [summary for summary, _ in done]
         _warn_of_steps_outside_ramp(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
@@ -155,7 +155,7 @@ def _write_steps(
                 last = case.finished(last)
                 error = {ERROR_FIELD: estimate_error(case.model, last).cells} if fields else {}
                 writer.write(dataclasses.replace(last, cell_fields=error) if fields else last)
-                steps.append(of_step(last))
+                steps.append(step_entry(last))
                 progress.step(last, writer.n_steps)  # n_steps excludes steps that are still being written
             writer.wait()
         except (ConvergenceError, KeyboardInterrupt) as error:

@@ -17,7 +17,7 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 
 # Default ratio of the opening at the largest traction to that at break.
-ELASTIC = 0.01
+INITIATION_RATIO = 0.01
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class CohesiveLaw:
     def limits(self, opening: Array, sliding: Array) -> tuple[Array, Array]:
         """Return the separations (m,) at damage initiation and at break [length].
 
-        They depend only on the ratio of `opening` to `sliding` (m,) [length], the mode ratio.
+        They depend only on the mode ratio, the ratio of `opening` to `sliding` (m,) [length].
         """
         normal, shear = self.strength / self.stiffness, self.shear_strength / self.stiffness
         square = np.maximum(opening, 0.0) ** 2 + sliding**2
@@ -88,19 +88,23 @@ class CohesiveLaw:
         damage = np.minimum(final * (separation - onset) / (separation * (final - onset)), 1.0)
         return damage if self.reversible else np.maximum(damage, previous)
 
-    def released(self, opening: Array, sliding: Array, damage: Array) -> Array:
-        """Return the energy (m,) dissipated per area by the damage (m,), at the mode ratio of opening and sliding (m,)."""
+    def dissipated_energy(self, opening: Array, sliding: Array, damage: Array) -> Array:
+        """Return the energy (m,) per area that `damage` (m,) has dissipated [pressure length].
+
+        It is that at the mode ratio of `opening` and `sliding` (m,) [length].
+        """
         onset, final = self.limits(opening, sliding)
-        separation = onset * final / (final - damage * (final - onset))
+        separation = onset * final / (final - damage * (final - onset))  # at which `damage` is reached
         return 0.5 * self.stiffness * onset * final * (separation - onset) / (final - onset)
 
 
 def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **options: Any) -> CohesiveLaw:
-    """Return a law. By default the limits of sliding are those of opening.
+    """Return a law with a strength [pressure] and a fracture energy [pressure length], and other parameters as `options`.
 
-    Without a given stiffness, damage begins at the fraction ELASTIC of the opening at break.
+    By default, the limits in sliding are those in opening, and in pure opening damage begins at the fraction INITIATION_RATIO
+    of the opening at break.
     """
-    stiffness = options.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
+    stiffness = options.pop("stiffness", strength**2 / (2.0 * INITIATION_RATIO * energy))
     options = {"shear_strength": strength, "shear_energy": energy, **options}
     return CohesiveLaw(strength, energy, stiffness, **options, reversible=reversible)
 
@@ -133,5 +137,5 @@ class Bond:
         """Return the sliding (n, dim) [length] and damage (n,) at the points of the layer nearest to `positions` (n, dim)."""
         if np.array_equal(positions, self.positions):
             return self.sliding, self.damage
-        rows = nearest(self.positions, positions)[1]
-        return self.sliding[rows], self.damage[rows]
+        points = nearest(self.positions, positions)[1]
+        return self.sliding[points], self.damage[points]

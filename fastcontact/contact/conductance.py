@@ -27,7 +27,7 @@ TABLES = ("pressure", "gap")
 
 
 class Conductance:
-    """Thermal conductance of a contact: heat flow per area and temperature difference.
+    """Thermal conductance of a contact: heat flow per area and temperature difference [power / (area temperature)].
 
     Raises ContactError if `law` has none of the forms below.
 
@@ -39,7 +39,7 @@ class Conductance:
         A number, which applies where the sides touch; a function of pressures and gaps (m,), which also applies where the
         sides are open; pairs (pressure, conductance), which apply where the sides touch; or a mapping of ``"pressure"`` to
         such pairs and of ``"gap"`` to pairs (gap, conductance), which apply where the sides are open, or everywhere if there
-        are no pairs for pressure [power / (area temperature)].
+        are no pairs for pressure.
     """
 
     def __init__(self, name: str, law: Any) -> None:
@@ -56,6 +56,7 @@ class Conductance:
         self._tables = {key: self._table(rows) for key, rows in tables.items()}
 
     def _table(self, rows: Any) -> Array:
+        """Return pairs as an array (n, 2)."""
         try:
             table = np.array([[float(value) for value in row] for row in rows]).reshape(-1, 2)
         except (TypeError, ValueError):
@@ -77,11 +78,11 @@ class Conductance:
         """Values that identify the conductance: the argument itself or, for a function, samples of its values."""
         if not callable(self._law):
             return self._law
-        scale = np.concatenate([[0.0], np.logspace(-9, 9, 37)])
-        return [self(scale, np.zeros(len(scale))), self(np.zeros(len(scale)), scale)]
+        samples = np.concatenate([[0.0], np.logspace(-9, 9, 37)])
+        return [self(samples, np.zeros(len(samples))), self(np.zeros(len(samples)), samples)]
 
     def __call__(self, pressure: Array, gap: Array) -> Array:
-        """Return conductances (m,) at pressures (m,) [pressure] and gaps (m,), zero where the sides touch [length].
+        """Return conductances (m,) at pressures (m,) [pressure] and gaps (m,) [length]; a gap of zero means contact.
 
         Raises ContactError if a function fails or does not return nonnegative numbers of this shape.
         """
@@ -149,12 +150,12 @@ def heat_transfer(
     on_secondary[secondary.points] = True
     if isinstance(primary, Surface):
         on_secondary[primary.points] = False
-    by_axis = [csr_array(constraints.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
-    normal = np.stack([rows @ on_secondary for rows in by_axis], axis=1)
-    length = np.einsum("md,md->m", normal, normal)
-    scale = normal / np.where(length > 0.0, length, np.inf)[:, None]
-    rows = sum(diags_array(scale[:, axis]) @ by_axis[axis] for axis in range(dim))
+    components = [csr_array(constraints.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
+    normal = np.stack([matrix @ on_secondary for matrix in components], axis=1)
+    square = np.einsum("md,md->m", normal, normal)
+    scale = normal / np.where(square > 0.0, square, np.inf)[:, None]
+    weights = sum(diags_array(scale[:, axis]) @ components[axis] for axis in range(dim))
     assert constraints.areas is not None
-    facing = np.isfinite(constraints.areas) & (length > 0.0)
-    rows_of_side = csr_array(rows @ diags_array(on_secondary.astype(float)))
-    return HeatTransfer(rows_of_side, csr_array(rows_of_side - rows), np.where(facing, constraints.areas, 0.0))
+    is_facing = np.isfinite(constraints.areas) & (square > 0.0)
+    on_side = csr_array(weights @ diags_array(on_secondary.astype(float)))
+    return HeatTransfer(on_side, csr_array(on_side - weights), np.where(is_facing, constraints.areas, 0.0))

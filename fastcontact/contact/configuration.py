@@ -22,7 +22,7 @@ class Configuration:
     start : ndarray (n_points, dim)
         Displacements at the beginning of the load step, from which slip is measured [length].
     pose, pose_start : Pose
-        Current position and rotation of a rigid obstacle, and those at the beginning of the load step.
+        Current displacement and rotation of a rigid obstacle, and those at the beginning of the load step.
     clearance_factor : float
         Factor of the clearances of the pair [-].
     never_opening : (ndarray (k, dim), ndarray of bool (k,)), optional
@@ -31,8 +31,8 @@ class Configuration:
     elastic_slip : (ndarray (k, dim), ndarray (k, dim)), optional
         Reference positions of the k constraints at the end of the previous load step, and their elastic slips [length]; None
         without tangential compliance.
-    worn : ndarray (n_points,), optional
-        Wear depth at the secondary nodes at the beginning of the load step [length]; None without wear.
+    wear_depth : ndarray (n_points,), optional
+        Wear depth at the secondary nodes at the beginning of the load step, zero at other points [length]; None without wear.
     bond : Bond, optional
         State of the cohesive layer at the end of the previous load step; None without a layer, and before the first step.
     fluid_pressure : float
@@ -42,7 +42,7 @@ class Configuration:
     rounded : bool
         Whether pairings have alternated between two states. Then the normals of facets vary continuously across edges, see
         `pairing.pair`, and nodes of dual mortar with a small overlap have no gap.
-    linearised : ndarray (n_points, dim), optional
+    linearisation_point : ndarray (n_points, dim), optional
         Displacements at which the tangent of bodies in finite strain is computed [length]; None for small strains.
     friction_factor : float
         Factor of the coefficient of friction [-].
@@ -55,12 +55,12 @@ class Configuration:
     clearance_factor: float = 1.0
     never_opening: tuple[Array, Mask] | None = None
     elastic_slip: tuple[Array, Array] | None = None
-    worn: Array | None = None
+    wear_depth: Array | None = None
     bond: Bond | None = None
     fluid_pressure: float = 0.0
     pressure: Array | None = None
     rounded: bool = False
-    linearised: Array | None = None
+    linearisation_point: Array | None = None
     friction_factor: float = 1.0
 
     @classmethod

@@ -28,7 +28,7 @@ class Compliance(Protocol):
     def block(self, rows: Indices) -> Array:
         """Return the submatrix (q, q) of C for the constraints `rows` (q,); if C is diagonal, only the diagonal (q,)."""
 
-    def among(self, rows: Indices) -> Array | FieldCompliance:
+    def block_operator(self, rows: Indices) -> Array | FieldCompliance:
         """Return the value of `block`, or an equivalent object that linear solvers can use without forming the submatrix."""
 
     def apply(self, multiplier: Array) -> Array:
@@ -43,8 +43,8 @@ class NodalField(Protocol):
     nodal_areas : ndarray (n_nodes,)
         Integrals of the shape functions of the nodes over the secondary side [area].
     covered : ndarray (n_nodes,) or float
-        Fraction of the area of each node in which contact is possible. Parts of facets without an opposite facet and parts
-        that options of the pair exclude do not count [-].
+        Fraction of the area of each node in which contact is possible. It is less than 1 if parts of its facets face no
+        primary facet, or if options of the pair exclude them [-].
     """
 
     nodal_areas: Array
@@ -61,10 +61,10 @@ class NodalField(Protocol):
         """
 
     def traction(self, force: Array) -> Array:
-        """Return nodal tractions (n_nodes, dim) [pressure] for forces (m, dim) [force], like `over_whole_side`."""
-        return np.column_stack([self.over_whole_side(component) for component in force.T])
+        """Return nodal tractions (n_nodes, dim) [pressure] for forces (m, dim) [force], like `side_pressure`."""
+        return np.column_stack([self.side_pressure(component) for component in force.T])
 
-    def over_whole_side(self, force: Array) -> Array:
+    def side_pressure(self, force: Array) -> Array:
         """Return nodal pressures (n_nodes,) [pressure] per unit of the complete area of each node.
 
         The area includes parts without an opposite facet. The integral of these pressures over the complete secondary side
@@ -72,12 +72,12 @@ class NodalField(Protocol):
         """
         return self.pressure(force) * self.covered
 
-    def shares(self, force: Array) -> Array:
-        """Return the normal forces (m,) of the constraints, distributed to the nodes (n_nodes,) [force].
+    def nodal_forces(self, force: Array) -> Array:
+        """Return the normal forces `force` (m,) of the constraints, distributed to the nodes (n_nodes,) [force].
 
-        The result is the product of `over_whole_side` and the nodal areas, except at nodes whose areas vanish.
+        The result is the product of `side_pressure` and the nodal areas, except at nodes whose areas vanish.
         """
-        return self.over_whole_side(force) * self.nodal_areas
+        return self.side_pressure(force) * self.nodal_areas
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
         """Return nodal gaps and the node of each constraint.
@@ -116,17 +116,17 @@ class NodalField(Protocol):
         """
         return active
 
-    def initially_active(self, gap: Array, pressure: Array, last: Mask) -> Mask:
+    def initial_active_set(self, gap: Array, pressure: Array, previous: Mask) -> Mask:
         """Return an initial guess (m,) of the active set.
 
-        `gap` (m,) are the gaps [length], and `pressure` (n_nodes,) and `last` (m,) the nodal pressures [pressure] and the
-        active set of the previous pairing. If all pairings have the same constraints, `last` is the best guess.
+        `gap` (m,) are the gaps [length]. `pressure` (n_nodes,) are the nodal pressures [pressure], and `previous` (m,) is the
+        active set of the previous pairing. If all pairings have the same constraints, `previous` is the best guess.
         """
-        return last
+        return previous
 
 
-class Wetted(Protocol):
-    """Part of a contact that fluid fills; see `fluid_pressure.Wetted`."""
+class WettedRegion(Protocol):
+    """Part of a contact that fluid fills; see `fluid_pressure.WettedRegion`."""
 
     @property
     def rows(self) -> Mask:
@@ -149,7 +149,7 @@ class Wetted(Protocol):
 class Linearised(Protocol):
     """Contact forces, gaps and slips of one pair, linearised about a pairing and its solution; see `linearised_geometry`."""
 
-    def along(self, du: Array) -> tuple[Array, Array]:
+    def derivatives_along(self, du: Array) -> tuple[Array, Array]:
         """Return the directional derivatives along `du` (n_points, dim) [length].
 
         They are those of the nodal forces (n_points, dim) [force] and of the gaps and slips (1 + k, m) [length].
@@ -180,8 +180,8 @@ class Tied(Protocol):
 class Constraints:
     """Contact constraints ``gap0 + B u + C multiplier >= 0`` with multipliers >= 0, or equations.
 
-    An optional attribute is None if it is zero or if the constraints lack the feature. Empty arrays are replaced by zeros
-    for all constraints.
+    An optional attribute is None if it is zero or if the constraints lack the feature. Other attributes have zeros for all
+    constraints if an empty array is passed.
 
     Attributes
     ----------
@@ -202,12 +202,12 @@ class Constraints:
         Unit tangents in the axes in which C couples the components of force vectors; empty if these are the axes of the mesh
         [-].
     slip0 : ndarray (k, m)
-        Part of the slips of the load step that does not depend on its displacements: that due to the motion of a rigid
-        primary side, or minus that due to closing gaps [length].
+        Part of the slips of the load step that does not depend on the displacements u: minus the motion of a rigid primary
+        side in the step, or minus the tangential displacement that closes the gap [length].
     friction : ndarray (m,)
         Coefficients of friction [-].
     equality : ndarray of bool (m,)
-        Constraints that are equations, with multipliers of either sign.
+        Whether each constraint is an equation, with a multiplier of either sign.
     softness : ndarray (m,)
         Compliance of each constraint along its normal, in addition to C [length / force].
     tangential_softness : ndarray (m,)
@@ -219,12 +219,12 @@ class Constraints:
         Factor Z of a compliance ``Z @ Z.T`` in addition to C. ``Z[0]`` belongs to the normal forces, ``Z[1:]`` to the forces
         along the tangents [(length / force)^(1/2)].
     driven : ndarray (k, m), optional
-        Slips that supports and obstacles impose, relative to the largest imposed displacement [-].
+        Slips that supports and obstacles impose, divided by the largest imposed displacement [-].
     law : OverclosureLaw, optional
         Pressure-overclosure law of which `gap0` and `softness` are the linearisation.
     branches : ndarray of int, optional
         Branch of the cohesive law at each point of a cohesive layer.
-    wetted : Wetted, optional
+    wetted : WettedRegion, optional
         Part of the contact that fluid fills.
     areas : ndarray (m,), optional
         Area of each constraint, infinite for constraints that cannot carry forces [area].
@@ -237,7 +237,8 @@ class Constraints:
     geometry : Geometry, optional
         Derivatives of B and of the gaps with respect to the displacements; None if they are zero or not available.
     prescribed : ndarray of bool (m,)
-        Constraints with empty rows of B whose gaps supports prescribe. Their softness determines their forces.
+        Whether supports prescribe the gap of each constraint, whose row of B is then empty. Its softness determines its
+        force.
     """
 
     B: csr_array
@@ -260,7 +261,7 @@ class Constraints:
     driven: Array | None = None
     law: OverclosureLaw | None = None
     branches: AnyArray | None = None
-    wetted: Wetted | None = None
+    wetted: WettedRegion | None = None
     coupled_directions: tuple[Array, ...] = ()
     geometry: Geometry | None = None
     prescribed: Mask = field(default_factory=np.empty(0, bool).copy)
@@ -285,7 +286,7 @@ class Constraints:
     @property
     def normal_compliance(self) -> Compliance | None:
         """Total compliance along the normals, the sum of C and `softness`; None if it is zero."""
-        return _Softened(self.compliance, self.softness) if self.softness.any() else self.compliance
+        return _WithSoftness(self.compliance, self.softness) if self.softness.any() else self.compliance
 
     @property
     def coupled(self) -> bool:
@@ -313,7 +314,7 @@ class Constraints:
         return np.asarray(self.gap0 + self.B @ displacement.ravel())
 
     def without(self, open_constraints: Mask) -> Constraints:
-        """Return a copy in which the constraints `open_constraints` (m,) cannot close."""
+        """Return a copy in which the constraints that the mask `open_constraints` (m,) marks cannot close."""
         if not open_constraints.any():
             return self
         keep = diags_array((~open_constraints).astype(float))
@@ -385,17 +386,17 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     rows_of_pairs = dict(zip(by_pair, map(slice, ends[:-1], ends[1:]), strict=True))
     if len(pairs) == 1:
         return StackedConstraints(**vars(pairs[0]), parts=by_pair, rows=rows_of_pairs)
-    count, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
+    k, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
     branches = [pair.branches for pair in pairs if pair.branches is not None]
-    tangents = [pair.tangents or (csr_array(pair.B.shape),) * count for pair in pairs]
+    tangents = [pair.tangents or (csr_array(pair.B.shape),) * k for pair in pairs]
 
-    columns: dict[str, Any] = {
+    concatenated: dict[str, Any] = {
         name: np.concatenate([getattr(pair, name) for pair in pairs])
         for name in ("gap0", "positions", "friction", "equality", "softness", "tangential_softness")
     }
     for name in ("slip0", "elastic_slip"):  # zero for pairs without tangents
-        columns[name] = np.hstack([np.resize(getattr(pair, name), (count, len(pair))) for pair in pairs])
-    factors = [np.zeros((1 + count, *pair.low_rank_compliance.shape[1:])) for pair in pairs]
+        concatenated[name] = np.hstack([np.resize(getattr(pair, name), (k, len(pair))) for pair in pairs])
+    factors = [np.zeros((1 + k, *pair.low_rank_compliance.shape[1:])) for pair in pairs]
     for factor, pair in zip(factors, pairs, strict=True):
         factor[: 1 + len(pair.tangents)] = pair.low_rank_compliance
     return StackedConstraints(
@@ -403,13 +404,13 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
         compliance=_BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
         tangents=tuple(csr_array(vstack(rows, format="csr")) for rows in zip(*tangents, strict=True)),
         directions=_stacked_directions(pairs),
-        low_rank_compliance=np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
+        low_rank_compliance=np.stack([block_diag(*factor) for factor in zip(*factors, strict=True)]),
         nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
         branches=np.concatenate(branches) if branches else None,
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=by_pair,
         rows=rows_of_pairs,
-        **columns,
+        **concatenated,
     )
 
 
@@ -419,30 +420,30 @@ def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tupl
     With `coupled`, `coupled_directions` take precedence over `directions`.
     """
     directions = [(pair.coupled_directions if coupled else ()) or pair.directions for pair in pairs]
-    count = max(map(len, directions))
-    tangents = [t or (np.zeros_like(pair.positions),) * count for t, pair in zip(directions, pairs, strict=True)]
-    return tuple(np.vstack(of_axis) for of_axis in zip(*tangents, strict=True))
+    k = max(map(len, directions))
+    tangents = [t or (np.zeros_like(pair.positions),) * k for t, pair in zip(directions, pairs, strict=True)]
+    return tuple(map(np.vstack, zip(*tangents, strict=True)))
 
 
-class _Softened:
-    """The sum of a compliance `inner` and a diagonal one, `softness` (m,); see `Compliance`."""
+class _WithSoftness:
+    """The sum of a `compliance` and a diagonal one, `softness` (m,) [length / force]; see `Compliance`."""
 
-    def __init__(self, inner: Compliance | None, softness: Array) -> None:
-        self._inner, self._softness = inner, softness
+    def __init__(self, compliance: Compliance | None, softness: Array) -> None:
+        self._compliance, self._softness = compliance, softness
 
     def block(self, rows: Indices) -> Array:
         softness = self._softness[rows]
-        return softness if self._inner is None else np.diag(softness) + self._inner.block(rows)
+        return softness if self._compliance is None else np.diag(softness) + self._compliance.block(rows)
 
-    def among(self, rows: Indices) -> Array | FieldCompliance:
-        inner = None if self._inner is None else self._inner.among(rows)
-        if isinstance(inner, FieldCompliance):
-            return inner.softened(self._softness[rows], lambda: self.block(rows))
+    def block_operator(self, rows: Indices) -> Array | FieldCompliance:
+        operator = None if self._compliance is None else self._compliance.block_operator(rows)
+        if isinstance(operator, FieldCompliance):
+            return operator.softened(self._softness[rows], lambda: self.block(rows))
         return self.block(rows)
 
     def apply(self, multiplier: Array) -> Array:
-        elastic = (self._softness * multiplier.T).T
-        return elastic if self._inner is None else elastic + self._inner.apply(multiplier)
+        diagonal_part = (self._softness * multiplier.T).T
+        return diagonal_part if self._compliance is None else diagonal_part + self._compliance.apply(multiplier)
 
 
 class _BlockDiagonal:
@@ -459,14 +460,14 @@ class _BlockDiagonal:
                 values[np.ix_(in_block, in_block)] = compliance.block(rows_of_pair)
         return values
 
-    def among(self, rows: Indices) -> Array | FieldCompliance:
+    def block_operator(self, rows: Indices) -> Array | FieldCompliance:
         blocks = []
-        for inner, (_, rows_of_pair) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
+        for compliance, (_, rows_of_pair) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
             n = len(rows_of_pair)
-            compliance = FieldCompliance.none(n) if inner is None or not n else inner.among(rows_of_pair)
-            if not isinstance(compliance, FieldCompliance):
+            block = FieldCompliance.none(n) if compliance is None or not n else compliance.block_operator(rows_of_pair)
+            if not isinstance(block, FieldCompliance):
                 return self.block(rows)
-            blocks.append(compliance)
+            blocks.append(block)
         return FieldCompliance.stacked(blocks, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:

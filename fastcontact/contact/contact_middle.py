@@ -1,4 +1,4 @@
-"""Centre of a contact zone, and distances from it on the secondary surface.
+"""Middle of a contact zone, and distances from it on the secondary surface.
 
 In axisymmetry the middle lies on the axis if the surface reaches the axis, or if the surface faces along the axis and its
 radius changes monotonically. Otherwise the middle is the centre of pressure. If the contact reaches planes of symmetry, it
@@ -39,6 +39,7 @@ class UnrolledLine:
     abscissa : ndarray (k,)
         Arc length along the line to each node [length].
     closed : bool
+        Whether the line ends where it begins.
     """
 
     nodes: Array
@@ -50,7 +51,7 @@ class UnrolledLine:
         """Total length of the line [length]."""
         return float(self.abscissa[-1])
 
-    def at(self, length: float) -> Array:
+    def point_at(self, length: float) -> Array:
         """Return the point (2,) at an arc length along the line [length]."""
         x, y = self.nodes.T
         return np.array([np.interp(length, self.abscissa, x), np.interp(length, self.abscissa, y)])
@@ -59,18 +60,19 @@ class UnrolledLine:
         """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
         segments = np.stack([self.nodes[:-1], self.nodes[1:]], axis=1)
         segment, xi = closest(positions, segments)[:2]
-        sizes = np.linalg.norm(np.diff(self.nodes, axis=0), axis=1)
-        return np.asarray(self.abscissa[segment] + 0.5 * (1.0 + xi[:, 0]) * sizes[segment])
+        segment_lengths = np.linalg.norm(np.diff(self.nodes, axis=0), axis=1)
+        return np.asarray(self.abscissa[segment] + 0.5 * (1.0 + xi[:, 0]) * segment_lengths[segment])
 
 
-def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
-    """Return the line of a surface in a plane model; None if the surface has several pieces or branches.
+def unrolled_line(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
+    """Return the line of a surface in 2D; None if the surface has several pieces or branches.
 
-    A closed line is cut at the node farthest from `middle` (2,) [length] or, without a middle, at its lowest node.
+    `coordinates` (n_points, 2) are those of all points [length]. A closed line is cut at the node farthest from `middle` (2,)
+    [length] or, without a middle, at its lowest node.
     """
     if surface.abscissa.any():
         return UnrolledLine(coordinates[surface.points], surface.abscissa)
-    order = _loop(surface)
+    order = _nodes_of_closed_line(surface)
     if order is None:
         return None
     nodes = coordinates[surface.points][order]
@@ -81,13 +83,13 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
     return UnrolledLine(nodes, np.concatenate([[0.0], np.cumsum(lengths)]), closed=True)
 
 
-def _loop(surface: Surface) -> list[int] | None:
-    """Return the nodes, as rows of the points of a surface, in order along its closed line; None if there is no such line."""
+def _nodes_of_closed_line(surface: Surface) -> list[int] | None:
+    """Return the nodes, numbered on the surface, in order along its closed line; None if it is not a single closed line."""
     # The nodes of each facet in order along the line, without its end.
     chains = [chain for block in surface.blocks for chain in np.delete(block.local, 1, axis=1).tolist()]
-    following = surface.line_neighbours[:, 1].tolist()
+    successors = surface.line_neighbours[:, 1].tolist()
     order = [0]
-    while (facet := following[order[-1]]) > 0 and len(order) < len(chains):
+    while (facet := successors[order[-1]]) > 0 and len(order) < len(chains):
         order.append(facet)
     return [node for facet in order for node in chains[facet]] if facet == 0 and len(order) == len(chains) else None
 
@@ -160,8 +162,8 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     if pair.axisymmetric and (meets_axis or (axial and _radius_is_monotone(surface, pair.points))):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = pair.symmetry_planes
-    if closed.any():  # only the planes that the contact reaches
-        near_closed = surface.beside @ closed > 0
+    if closed.any():  # keep only the planes that the contact reaches
+        near_closed = surface.node_adjacency @ closed > 0
         planes = [(axis, nodes) for axis, nodes in planes if near_closed[nodes].any()]
     if dim == 2:
         return _middle_in_2d(surface, pair.points, weight, planes, mean)
@@ -171,16 +173,17 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
 def _middle_in_3d(points: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array) -> ContactMiddle:
     """Return the middle on a surface in 3D.
 
-    Parallel planes of symmetry at two opposite ends represent an infinite surface.
+    Parallel planes of symmetry at two opposite ends represent an infinite surface. The parameters are the positions (n_nodes,
+    3) of the nodes [length], their `_weights`, the `planes` of symmetry, and the weighted `mean` (3,) of the normals.
     """
-    centre, single, ignored = weight @ points, list[tuple[Array, float]](), list[Array]()
+    centre, unpaired, ignored = weight @ points, list[tuple[Array, float]](), list[Array]()
     for axis, nodes in planes:
         if sum(axis is other for other, _ in planes) == 1:
-            single.append((axis, float(points[nodes].mean(axis=0) @ axis)))
+            unpaired.append((axis, float(points[nodes].mean(axis=0) @ axis)))
         elif not any(axis is other for other in ignored):
             ignored.append(axis)
-    if single:
-        axes, values = np.stack([axis for axis, _ in single]), np.array([value for _, value in single])
+    if unpaired:
+        axes, values = np.stack([axis for axis, _ in unpaired]), np.array([value for _, value in unpaired])
         onto_planes = np.linalg.pinv(axes)
         centre, mean = centre + onto_planes @ (values - axes @ centre), mean - onto_planes @ (axes @ mean)
     length = float(np.linalg.norm(mean))
@@ -190,17 +193,17 @@ def _middle_in_3d(points: Array, weight: Array, planes: list[tuple[Array, Indice
 
 def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
     """Return whether the radius changes monotonically along a surface; True if the surface is not a single line."""
-    line = unrolled(surface, coordinates, None)
+    line = unrolled_line(surface, coordinates, None)
     if line is None:
         return True
-    steps, noise = np.diff(line.nodes[:, 0]), LENGTH_ROUND_OFF * float(np.ptp(line.nodes, axis=0).max())
-    return bool(steps.min() >= -noise or steps.max() <= noise)
+    steps, tolerance = np.diff(line.nodes[:, 0]), LENGTH_ROUND_OFF * float(np.ptp(line.nodes, axis=0).max())
+    return bool(steps.min() >= -tolerance or steps.max() <= tolerance)
 
 
 def _weights(force: Array, gap: Array) -> Array:
     """Return the weights (n_nodes,) of the nodes for the centre of pressure, whose sum is 1 [-]."""
     weight, total = force, float(force.sum())
-    if total <= 1e-6 * float(np.abs(force).sum()):  # no force, or tension of equal magnitude
+    if total <= 1e-6 * float(np.abs(force).sum()):  # if tension nearly cancels or exceeds compression
         weight = np.abs(force)
         total = float(weight.sum())
     if total > 0:
@@ -219,16 +222,16 @@ def _middle_in_2d(
     """
     points, length = coordinates[surface.points], float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
-    line = unrolled(surface, coordinates, centre if length > FACING else None)
+    line = unrolled_line(surface, coordinates, centre if length > FACING else None)
     if line is None:
-        reach = float(np.ptp(points, axis=0).max())
-        line = UnrolledLine(centre + np.outer([-reach, reach], tangent), np.array([0.0, 2.0 * reach]))
+        size = float(np.ptp(points, axis=0).max())
+        line = UnrolledLine(centre + np.outer([-size, size], tangent), np.array([0.0, 2.0 * size]))
     lengths = line.lengths(points)
     if len(planes) == 1 and not line.closed:
         axis, on_plane = planes[0]
         ends = lengths[on_plane]  # both ends of a half ring lie on the plane
         start = float(ends[np.argmin(np.abs(ends - weight @ lengths))])
         backward = start > 0.5 * (lengths.min() + lengths.max())
-        return ContactMiddle(line.at(start), line, start, backward, tangent=axis)
+        return ContactMiddle(line.point_at(start), line, start, backward, tangent=axis)
     start = float(weight @ lengths)
-    return ContactMiddle(line.at(start), line, start, tangent=tangent if length > FACING else None)
+    return ContactMiddle(line.point_at(start), line, start, tangent=tangent if length > FACING else None)

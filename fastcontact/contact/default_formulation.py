@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from fastcontact.contact.integration import all_nodes_carry
+from fastcontact.contact.integration import all_nodes_carry_pressure
 from fastcontact.mesh import elements
 
 # Options that mortar in two dimensions has for standard multipliers only.
@@ -60,7 +60,7 @@ def against_obstacle(
         if of_simplices and all(elements.get(name).linear == name for name in facets):
             reason = "the pressures of continuous contact oscillate on linear triangles and tetrahedra"
             return "node_to_segment", dict(options), reason
-        if dim == 3 and all(all_nodes_carry(name) for name in facets):
+        if dim == 3 and all(all_nodes_carry_pressure(name) for name in facets):
             return "node_to_segment", dict(options), "continuous contact costs many times as much in three dimensions"
         if dim == 3 and options.get("friction") and not any(name in options for name in STANDARD_OPTIONS):
             reason = "multigrid cannot eliminate continuous contact with friction in three dimensions"

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.contact.projection import CORNER, closest_of_kinds
+from fastcontact.contact.projection import CORNER, closest_of_types
 from fastcontact.contact.surface import by_block
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
@@ -24,13 +24,13 @@ INSET = 0.02
 
 @dataclass(frozen=True, eq=False)
 class OuterFacets:
-    """The outer facets of bodies, in blocks of one element type and numbered consecutively.
+    """The n outer facets of bodies, in blocks of one element type and numbered consecutively through all blocks.
 
     Attributes
     ----------
     mesh : Mesh
     blocks : dict of str to ndarray of int (n_facets, n_nodes)
-        Connectivity by element type, normals outward.
+        Nodes of the facets by element type, oriented such that normals point outward.
     body, cell : ndarray of int (n,)
         Body and solid cell of each facet.
     """
@@ -53,7 +53,7 @@ class OuterFacets:
         return cls(mesh, blocks, body_of_cells[cell], cell)
 
     @cached_property
-    def first(self) -> Indices:
+    def offsets(self) -> Indices:
         """Number of the first facet of each block, and the total number of facets."""
         return np.cumsum([0, *map(len, self.blocks.values())])
 
@@ -61,7 +61,7 @@ class OuterFacets:
     def samples(self) -> tuple[Indices, Array, Array]:
         """Facets (m,), positions (m, dim) [length] and outward normals (m, dim) of sample points inside the facets."""
         facet, point, normal = [], [], []
-        for (name, facets), first in zip(self.blocks.items(), self.first):
+        for (name, facets), first in zip(self.blocks.items(), self.offsets):
             element = elements.get(name)
             inset_nodes = element.nodes + INSET * (element.nodes.mean(axis=0) - element.nodes)
             xi = np.concatenate([element.quadrature[0], inset_nodes])  # facets may overlap only by a narrow strip
@@ -91,13 +91,13 @@ class OuterFacets:
     def spacing(self) -> Array:
         """Distances (n,) between the nodes of each facet [length]; for quadratic facets half the size."""
         order = [elements.get(name).order for name in self.blocks]
-        return self.size / np.repeat(order, np.diff(self.first))
+        return self.size / np.repeat(order, np.diff(self.offsets))
 
     @cached_property
     def boxes(self) -> tuple[Array, Array]:
         """Lower and upper corners (n, dim) of the bounding boxes of the nodes of each facet [length]."""
         nodes = [self.mesh.points[facets] for facets in self.blocks.values()]
-        return np.concatenate([c.min(axis=1) for c in nodes]), np.concatenate([c.max(axis=1) for c in nodes])
+        return np.concatenate([x.min(axis=1) for x in nodes]), np.concatenate([x.max(axis=1) for x in nodes])
 
     @cached_property
     def smooth_face(self) -> Indices:
@@ -106,7 +106,7 @@ class OuterFacets:
         Adjacent facets belong to the same smooth face if there is no corner between them.
         """
         keys, facet, normal = [], [], []
-        for (name, facets), first in zip(self.blocks.items(), self.first):
+        for (name, facets), first in zip(self.blocks.items(), self.offsets):
             element = elements.get(name)
             at_nodes = area_vectors(self.mesh.points[facets], element.gradient(element.nodes))
             at_nodes /= np.linalg.norm(at_nodes, axis=2, keepdims=True)
@@ -125,13 +125,13 @@ class OuterFacets:
         return np.asarray(connected_components(graph, directed=False)[1], np.intp)
 
     def facets(self, numbers: Indices) -> dict[str, Numbers]:
-        """Return the connectivity of the facets `numbers` by element type."""
-        of_blocks = zip(self.blocks.items(), by_block(numbers, map(len, self.blocks.values())), strict=True)
-        return {name: block[rows] for (name, block), (_, rows) in of_blocks if len(rows)}
+        """Return the nodes of the facets `numbers` by element type."""
+        blocks_and_rows = zip(self.blocks.items(), by_block(numbers, map(len, self.blocks.values())), strict=True)
+        return {name: block[rows] for (name, block), (_, rows) in blocks_and_rows if len(rows)}
 
 
 @dataclass(frozen=True, eq=False)
-class Facing:
+class FacingPoints:
     """Points of facets that face another body.
 
     Attributes
@@ -147,13 +147,13 @@ class Facing:
     gap: Array
 
 
-def facing(facets: OuterFacets, distance: float | None, angle: float) -> Facing:
+def facing_points(facets: OuterFacets, distance: float | None, angle: float) -> FacingPoints:
     """Return the points at which facets face another body; see `find_contacts` for `distance` [length] and `angle` [degrees].
 
     Only the closest facet of all other bodies counts, so that a third body between two bodies hides them from each other.
     """
-    everywhere = np.ones(len(facets.body), bool)
-    close = _search(facets, distance, angle, everywhere)
+    all_facets = np.ones(len(facets.body), bool)
+    close = _search(facets, distance, angle, all_facets)
     if distance is not None:
         return close
     # Two smooth faces that are close to each other in one place also face each other where their gap is larger.
@@ -161,42 +161,44 @@ def facing(facets: OuterFacets, distance: float | None, angle: float) -> Facing:
     key = np.sort(np.column_stack([face[close.facet], face[close.opposite]]), axis=1) @ [len(face), 1]
     distant = _search(facets, np.inf, angle, np.isin(face, face[np.concatenate([close.facet, close.opposite])]))
     distant_key = np.sort(np.column_stack([face[distant.facet], face[distant.opposite]]), axis=1) @ [len(face), 1]
-    ahead, touching = np.isin(distant_key, key) & (distant.gap > 0.0), close.gap <= 0.0
+    # The distant points include all open points of the same pairs of faces, and the close points those that touch or overlap.
+    is_open, is_closed = np.isin(distant_key, key) & (distant.gap > 0.0), close.gap <= 0.0
     fields = ((close.facet, distant.facet), (close.opposite, distant.opposite), (close.gap, distant.gap))
-    return Facing(*(np.concatenate([of_close[touching], of_distant[ahead]]) for of_close, of_distant in fields))
+    return FacingPoints(*(np.concatenate([closed[is_closed], opened[is_open]]) for closed, opened in fields))
 
 
-def _search(facets: OuterFacets, distance: float | None, angle: float, searched: Mask) -> Facing:
-    """Return the facets of other bodies that the sample points of the facets `searched` (n,) face."""
-    facing_of_bodies = [_facing_of_body(facets, body, distance, angle, searched) for body in np.unique(facets.body)]
-    return Facing(*(np.concatenate(of_bodies) for of_bodies in zip(*facing_of_bodies, strict=True)))
+def _search(facets: OuterFacets, distance: float | None, angle: float, searched: Mask) -> FacingPoints:
+    """Return the points at which the facets that the mask `searched` (n,) marks face another body."""
+    by_body = (_arrays_of_body(facets, body, distance, angle, searched) for body in np.unique(facets.body))
+    return FacingPoints(*map(np.concatenate, zip(*by_body, strict=True)))
 
 
-def _facing_of_body(
+def _arrays_of_body(
     facets: OuterFacets, body: int, distance: float | None, angle: float, searched: Mask
 ) -> tuple[Indices, Indices, Array]:
-    """Return the arrays of `Facing` for the points in those facets of one body that are `searched` (n,)."""
+    """Return the arrays of `FacingPoints` for the points in those facets of one body that are `searched` (n,)."""
     facet_of_point, point, normal = facets.samples
     (low, high), size = facets.boxes, facets.size
     of_body = facets.body == body
     reach = float(size.max()) if distance is None else distance
-    begin, end = low[of_body].min(axis=0) - reach, high[of_body].max(axis=0) + reach
-    others = ~of_body & ((high >= begin) & (low <= end)).all(axis=1)
+    lower, upper = low[of_body].min(axis=0) - reach, high[of_body].max(axis=0) + reach
+    is_other = ~of_body & ((high >= lower) & (low <= upper)).all(axis=1)
     candidates = np.flatnonzero((of_body & searched)[facet_of_point])
-    if others.any():
-        position, begin, end = point[candidates], low[others].min(axis=0) - reach, high[others].max(axis=0) + reach
-        candidates = candidates[((position >= begin) & (position <= end)).all(axis=1)]
-    if not others.any() or not len(candidates):
+    if is_other.any():
+        lower, upper = low[is_other].min(axis=0) - reach, high[is_other].max(axis=0) + reach
+        position = point[candidates]
+        candidates = candidates[((position >= lower) & (position <= upper)).all(axis=1)]
+    if not is_other.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
-    facets_by_type = facets.facets(np.flatnonzero(others)).values()
-    closest = closest_of_kinds(point[candidates], [facets.mesh.points[block] for block in facets_by_type])
-    facet, opposite = facet_of_point[candidates], np.flatnonzero(others)[closest.facet]
+    facets_by_type = facets.facets(np.flatnonzero(is_other)).values()
+    closest = closest_of_types(point[candidates], [facets.mesh.points[block] for block in facets_by_type])
+    facet, opposite = facet_of_point[candidates], np.flatnonzero(is_other)[closest.facet]
     difference = point[candidates] - closest.position
     gap = np.einsum("nd,nd->n", difference, closest.normal)
     offset = np.linalg.norm(difference - gap[:, None] * closest.normal, axis=1)
-    larger = np.maximum(size[facet], size[opposite])
-    opposite_normals = np.einsum("nd,nd->n", normal[candidates], closest.normal) <= -np.cos(np.radians(angle))
-    near = closest.distance <= (larger if distance is None else distance) + LENGTH_ROUND_OFF * larger
-    ahead = offset <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
-    accepted = opposite_normals & near & ahead
-    return facet[accepted], opposite[accepted], gap[accepted]
+    larger_size = np.maximum(size[facet], size[opposite])
+    is_opposed = np.einsum("nd,nd->n", normal[candidates], closest.normal) <= -np.cos(np.radians(angle))
+    is_near = closest.distance <= (larger_size if distance is None else distance) + LENGTH_ROUND_OFF * larger_size
+    is_above = offset <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger_size
+    is_facing = is_opposed & is_near & is_above
+    return facet[is_facing], opposite[is_facing], gap[is_facing]

@@ -25,39 +25,40 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Mean gaps at open nodes beside the edge of the contact, where facets are partly closed, may be negative by up to this
-# fraction of the facet length.
-EDGE = 0.01
+# Mean gaps at open nodes near the edge of the contact, where facets are partly closed, may be negative by up to this fraction
+# of the facet length.
+EDGE_PENETRATION = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Wetted:
-    """Region that the fluid has reached.
+class WettedRegion:
+    """Region of a contact that the fluid has reached.
 
     Attributes
     ----------
     rows : ndarray of bool (m,)
-        Constraints in the region.
+        Whether each constraint belongs to the region.
     pressure : ndarray (n_nodes,)
         Fluid pressure at the secondary nodes [pressure].
-    spread : csr_array (n_points, n_nodes)
+    nodal_weights : csr_array (n_points, n_nodes)
         Matrix whose product with the area vectors at the secondary nodes is minus the nodal forces [force].
     areas : AreaVectors
+        Area vectors of the secondary side.
     """
 
     rows: Mask
     pressure: Array
-    spread: csr_array
+    nodal_weights: csr_array
     areas: AreaVectors
 
     def force(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length]."""
-        return np.asarray(-(self.spread @ self.areas.at(displacement)[0]))
+        return np.asarray(-(self.nodal_weights @ self.areas.at(displacement)[0]))
 
     def stiffness(self, displacement: Array) -> csr_array:
         """Return the symmetric part (n_dofs, n_dofs) of minus the derivative of `force` [force / length]."""
         dim, derivative = displacement.shape[1], self.areas.at(displacement)[1]
-        K = csr_array(kron(self.spread, eye_array(dim)) @ derivative)
+        K = csr_array(kron(self.nodal_weights, eye_array(dim)) @ derivative)
         return csr_array(0.5 * (K + K.T))
 
 
@@ -66,6 +67,14 @@ class AreaVectors:
     """Outward area vectors of the deformed secondary side at its nodes, per reference area (Nanson's formula).
 
     They are means over the facets around a node, weighted with the square of its shape function, which cannot be negative.
+
+    Attributes
+    ----------
+    side : Surface
+        The secondary side.
+    points : ndarray (n_points, dim)
+        Reference coordinates of all points [length].
+    axisymmetric : bool
     """
 
     side: Surface
@@ -113,25 +122,27 @@ def with_fluid_pressure(
     assert constraints.nodal is not None
     side, points = areas.side, areas.points
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
-    vectors = areas.at(np.zeros_like(points) if config.linearised is None else config.linearised)[0]
+    deformation = config.linearisation_point
+    vectors = areas.at(np.zeros_like(points) if deformation is None else deformation)[0]
     gaps = constraints.gaps(config.displacement)
     nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     if config.pressure is None:
         passable = nodal > LENGTH_ROUND_OFF * size
     else:
-        # A node under contact pressure is impermeable, even if only points beside it are closed. Contact pressures are forces
-        # per reference area.
-        nominal = config.fluid_pressure * (1.0 if config.linearised is None else np.linalg.norm(vectors, axis=1))
+        # A node under contact pressure is impermeable, even if it is open itself and only points near it are closed. Contact
+        # pressures are forces per reference area.
+        nominal = config.fluid_pressure * (1.0 if deformation is None else np.linalg.norm(vectors, axis=1))
         facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
-        passable = (nodal > -EDGE * facet_size) & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
+        passable = (nodal > -EDGE_PENETRATION * facet_size) & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
     nodes = connected_nodes(side, source, passable)
     rows = nodes[node] & constraints.usable
-    # A force that does not depend on the gap is represented by a linear law of small slope, which vanishes at a distance much
-    # larger than the side.
+    # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
+    # much larger than the side.
     distance_to_zero = size / SINGLE_PRECISION
     B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node])
     force = np.where(rows, config.fluid_pressure * constraints.areas, 0.0)
-    at_nodes = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
+    force_by_node = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
+    pressure = np.where(nodes, config.fluid_pressure, 0.0)
     return replace(
         constraints,
         B=B,
@@ -139,15 +150,15 @@ def with_fluid_pressure(
         softness=np.where(rows, distance_to_zero / (config.fluid_pressure * constraints.areas), constraints.softness),
         equality=constraints.equality | rows,
         friction=np.where(rows, 0.0, constraints.friction),
-        wetted=Wetted(rows, np.where(nodes, config.fluid_pressure, 0.0), csr_array(weights.T @ at_nodes), areas),
+        wetted=WettedRegion(rows, pressure, csr_array(weights.T @ force_by_node), areas),
     )
 
 
 def _rows_along_area_vectors(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr_array, csr_array]:
-    """Return B (m, n_dofs) with entries along area vectors in `rows` (m,), and their weights (m, n_points).
+    """Return B (m, n_dofs) with secondary entries along area vectors in the marked `rows` (m,), and their weights.
 
-    `vectors` (m, dim) are the area vectors of the secondary `side` per area [-]. On the primary side, their component along
-    the normal of the gap acts.
+    The weights (m, n_points) are those of the secondary points in these rows [-]. `vectors` (m, dim) are the area vectors of
+    the secondary `side` per area [-]. On the primary side, their component along the normal of the gap acts.
     """
     (m, n_dofs), dim = B.shape, vectors.shape[1]
     entries = B.tocoo()
@@ -157,19 +168,19 @@ def _rows_along_area_vectors(B: csr_array, rows: Mask, side: Surface, vectors: A
     np.add.at(normal, (row[on_secondary], component[on_secondary]), entries.data[on_secondary])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, length, out=normal, where=length > 0.0)
-    moved = on_secondary & rows[row]
-    values = entries.data[moved] * normal[row[moved], component[moved]]
-    weights = csr_array((values, (row[moved], point[moved])), shape=(m, n_dofs // dim))
+    replaced = on_secondary & rows[row]
+    values = entries.data[replaced] * normal[row[replaced], component[replaced]]
+    weights = csr_array((values, (row[replaced], point[replaced])), shape=(m, n_dofs // dim))
     area_ratio = np.where(rows, -np.einsum("md,md->m", vectors, normal), 1.0)
-    on_primary = csr_array((entries.data * area_ratio[row] * ~moved, (row, entries.col)), shape=B.shape)
-    with_area_vectors = csr_array(on_primary + rows_of(weights, -vectors))
+    other_entries = csr_array((entries.data * area_ratio[row] * ~replaced, (row, entries.col)), shape=B.shape)
+    with_area_vectors = csr_array(other_entries + rows_of(weights, -vectors))
     with_area_vectors.eliminate_zeros()
     return with_area_vectors, weights
 
 
 def connected_nodes(side: Surface, source: Mask, passable: Mask) -> Mask:
-    """Return which `passable` nodes (n_nodes,) the facets of a side connect with passable nodes of the `source`."""
+    """Return which `passable` nodes (n_nodes,) are connected with passable nodes of the `source` through facets."""
     nodes, connected = np.flatnonzero(passable), np.zeros(len(passable), bool)
-    component = connected_components(side.beside[nodes][:, nodes], directed=False)[1]
+    component = connected_components(side.node_adjacency[nodes][:, nodes], directed=False)[1]
     connected[nodes] = np.isin(component, component[source[nodes]])
     return connected

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.contact.facing_facets import Facing, OuterFacets, facing
+from fastcontact.contact.facing_facets import FacingPoints, OuterFacets, facing_points
 from fastcontact.errors import ContactError, FileError
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.mesh.topology import bodies
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     import pandas
 
 # Relative difference of node distances, moduli or areas below which two sides count as equal.
-ALIKE = 0.1
+EQUALITY_TOLERANCE = 0.1
 # Ratio of moduli above which the softer side is secondary, even if its mesh is coarser. With linear facets twice as fine on
 # the secondary side, pressures of mortar contact alternate by 0.03, 0.06, 0.10 and 0.14 of their mean if the secondary body
 # is 1, 3, 10 and 100 times as stiff as the other one; with the sides exchanged, by 0.01 or less.
-SOFTER = 3.0
+NOTABLE_MODULUS_RATIO = 3.0
 _COLUMNS = (
     "contact", "secondary", "primary", "secondary facets", "primary facets", "secondary spacing", "primary spacing",
     "smallest gap", "largest gap", "reason",
@@ -122,11 +122,13 @@ class FoundContacts(Sequence[FoundContact]):
             raise FileError("to_pandas needs pandas: pip install pandas") from error
         return pandas.DataFrame(self._rows(None), columns=list(_COLUMNS))
 
-    def _rows(self, numbers: str | None) -> list[tuple[Any, ...]]:
-        def shown(value: float) -> Any:
-            return value if numbers is None else numbers.format(value)
+    def _rows(self, number_format: str | None) -> list[tuple[Any, ...]]:
+        """Return the rows of the table, with lengths as strings in this format, or as numbers if it is None."""
 
-        return [(p.name, *p.bodies, *p.facets, *map(shown, (*p.spacing, *p.gap)), p.reason) for p in self.pairs]
+        def formatted(value: float) -> Any:
+            return value if number_format is None else number_format.format(value)
+
+        return [(p.name, *p.bodies, *p.facets, *map(formatted, (*p.spacing, *p.gap)), p.reason) for p in self.pairs]
 
 
 @typed(ContactError)
@@ -188,20 +190,20 @@ def find_contacts(
     if body.max(initial=-1) < 1:
         return FoundContacts(mesh)
     outer = OuterFacets.of(mesh, body)
-    search = facing(outer, distance, angle)
+    points = facing_points(outer, distance, angle)
     modulus = np.ones(mesh.n_cells)
     for name, values in (moduli or {}).items():
         modulus[mesh.offsets[name] : mesh.offsets[name] + len(mesh.cells[name])] = values
     names = list(groups) if groups is not None else _names(mesh, body)
     pairs: list[FoundContact] = []
     sides: dict[str, Mapping[str, ArrayLike]] = {}
-    for pair, facets in _pairs(outer, search, modulus, names):
+    for pair, facets in _pairs(outer, points, modulus, names):
         sides.update(zip((pair.secondary, pair.primary), map(outer.facets, facets)))
         pairs.append(pair)
     return FoundContacts(mesh.with_facets(sides), tuple(pairs))
 
 
-def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequence[str] | None) -> str:
+def no_contacts_message(mesh: Mesh, distance: float | None, angle: float, groups: Sequence[str] | None) -> str:
     """Return a message that explains why `find_contacts` finds no pairs, and states the remedy."""
     if groups is None and _whole_bodies(mesh).max() < 1:
         return (
@@ -269,16 +271,16 @@ def _names(mesh: Mesh, body: Indices) -> list[str]:
 
 
 def _pairs(
-    outer: OuterFacets, search: Facing, modulus: Array, names: Sequence[str]
+    outer: OuterFacets, points: FacingPoints, modulus: Array, names: Sequence[str]
 ) -> Iterator[tuple[FoundContact, tuple[Indices, Indices]]]:
     """Yield the pairs of smooth faces of two bodies, each together with the facets of both sides.
 
     `modulus` (n_cells,) are the moduli of the cells [pressure], and `names` those of the bodies.
     """
-    bodies_of_points = np.sort(np.column_stack([outer.body[search.facet], outer.body[search.opposite]]), axis=1)
+    bodies_of_points = np.sort(np.column_stack([outer.body[points.facet], outer.body[points.opposite]]), axis=1)
     for pair in np.unique(bodies_of_points, axis=0):
         samples = np.flatnonzero((bodies_of_points == pair).all(axis=1))
-        facet_pairs = np.column_stack([search.facet[samples], search.opposite[samples]])
+        facet_pairs = np.column_stack([points.facet[samples], points.opposite[samples]])
         reversed_rows = outer.body[facet_pairs[:, 0]] != pair[0]
         facet_pairs[reversed_rows] = facet_pairs[reversed_rows][:, ::-1]
         secondary, reason = _secondary(outer, facet_pairs, modulus)
@@ -286,7 +288,7 @@ def _pairs(
         face = outer.smooth_face[facet_pairs[:, 0]]
         for number, surface in enumerate(faces := np.unique(face), start=1):
             on_face = face == surface
-            gap, spacing = search.gap[samples[on_face]], _spacing(outer, facet_pairs[on_face])
+            gap, spacing = points.gap[samples[on_face]], _spacing(outer, facet_pairs[on_face])
             sides = np.unique(facet_pairs[on_face, 0]), np.unique(facet_pairs[on_face, 1])
             names_of_pair = names[numbers[0]], names[numbers[1]]
             title = " on ".join(names_of_pair) + (f" {number}" if len(faces) > 1 else "")
@@ -302,13 +304,16 @@ def _spacing(outer: OuterFacets, facet_pairs: Indices) -> Array:
 
 
 def _secondary(outer: OuterFacets, facet_pairs: Indices, modulus: Array) -> tuple[int, str]:
-    """Return which column of pairs of facets (n, 2) should be the secondary side, and the reason."""
+    """Return which column of pairs of facets (n, 2) should be the secondary side, and the reason.
+
+    `modulus` (n_cells,) are the moduli of the cells [pressure].
+    """
     moduli = modulus[outer.cell[facet_pairs]].mean(axis=0)
     measures = (
-        ("softer", moduli, 1.0 / SOFTER),
-        ("finer", _spacing(outer, facet_pairs), 1.0 - ALIKE),
-        ("softer", moduli, 1.0 - ALIKE),
-        ("smaller", np.array([outer.area[np.unique(side)].sum() for side in facet_pairs.T]), 1.0 - ALIKE),
+        ("softer", moduli, 1.0 / NOTABLE_MODULUS_RATIO),
+        ("finer", _spacing(outer, facet_pairs), 1.0 - EQUALITY_TOLERANCE),
+        ("softer", moduli, 1.0 - EQUALITY_TOLERANCE),
+        ("smaller", np.array([outer.area[np.unique(side)].sum() for side in facet_pairs.T]), 1.0 - EQUALITY_TOLERANCE),
     )
     for reason, values, ratio in measures:
         if values.min() < ratio * values.max():

@@ -24,10 +24,10 @@ from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 SAME_DIRECTION = float(np.cos(np.radians(0.5 * CORNER)))
 # Sine of the largest angle between the normal of a surface and a plane of symmetry at which the surface of the full model has
 # no corner at the plane. Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
-LEANING = float(np.sin(np.radians(21.0)))
+SMOOTH_INCLINATION = float(np.sin(np.radians(21.0)))
 # Largest distance of nodes from a plane of symmetry, relative to the size of the surface, and smallest cosine of the angle
 # between directions that are regarded as parallel. Coordinates in files may have six digits.
-PLANE, PARALLEL = 2e-5, 1.0 - SINGLE_PRECISION
+PLANE_TOLERANCE, PARALLEL = 2e-5, 1.0 - SINGLE_PRECISION
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class HeldMotions:
         driven = np.zeros_like(supported) if driven is None else driven
         return cls(nodes, projectors, driven, supported, mpc_rows)
 
-    def at(self, nodes: NDArray[np.integer]) -> Array:
+    def projectors_at(self, nodes: NDArray[np.integer]) -> Array:
         """Return the projectors (..., dim, dim) of `nodes` (...); zero for nodes that are free."""
         if not len(self.nodes):
             return np.zeros((*nodes.shape, *self.projectors.shape[1:]))
@@ -101,7 +101,7 @@ class HeldMotions:
 
 
 def _rows_of_single_nodes(mpc_rows: csr_array, dim: int) -> tuple[Indices, Array]:
-    """Return the nodes (k,) of the rows that involve only one node, and the unit vectors (k, dim) of these rows."""
+    """Return the nodes (k,) of the rows that involve only one node, and unit vectors (k, dim) along these rows."""
     entries, normals = mpc_rows.tocoo(), np.zeros((mpc_rows.shape[0], dim))
     row, column = entries.coords
     np.add.at(normals, (row, column % dim), entries.data)
@@ -112,7 +112,7 @@ def _rows_of_single_nodes(mpc_rows: csr_array, dim: int) -> tuple[Indices, Array
 
 
 def eigenspaces(tensors: Array, threshold: float) -> Array:
-    """Return projectors (n, dim, dim) onto eigenvectors of symmetric `tensors` with eigenvalues of at least `threshold`."""
+    """Return projectors (n, dim, dim) onto the eigenvectors of symmetric `tensors` with eigenvalues >= `threshold`."""
     values, vectors = np.linalg.eigh(tensors)
     vectors = np.where(values[:, None, :] >= threshold, vectors, 0.0)
     return np.asarray(vectors @ vectors.transpose(0, 2, 1))
@@ -148,11 +148,12 @@ def direction_fields(projectors: Array, positions: Array) -> list[tuple[Array, M
     list of (ndarray (n, dim), ndarray of bool (n,))
         Unit vectors of each field at all nodes, and the nodes that are held in its direction.
     """
-    remaining, directions = projectors.copy(), []
+    remaining, fields = projectors.copy(), []
     while len(seeds := np.flatnonzero(rank := np.trace(remaining, axis1=1, axis2=2).round())):
-        least = rank[seeds].min()
-        seeds = seeds[rank[seeds] == least]
-        seeds = seeds if least == 1 else seeds[:1]  # if all nodes are held in several directions, start from any node
+        lowest_rank = rank[seeds].min()
+        seeds = seeds[rank[seeds] == lowest_rank]
+        # If all nodes are held in several directions, start from any node.
+        seeds = seeds if lowest_rank == 1 else seeds[:1]
         axis = np.linalg.eigh(remaining[seeds])[1][:, :, -1]
         edges = np.where(np.abs(axis @ axis.T) >= SAME_DIRECTION, _distances(positions[seeds], positions[seeds]), 0.0)
         order, predecessor = breadth_first_order(minimum_spanning_tree(csr_array(edges)), 0, directed=False)
@@ -167,9 +168,9 @@ def direction_fields(projectors: Array, positions: Array) -> list[tuple[Array, M
         field[seeds[order]] = axis[order]
         held = np.einsum("nd,nde,ne->n", field, remaining, field) >= SAME_DIRECTION**2
         field[held] = _unit(np.einsum("nde,ne->nd", remaining[held], field[held]))
-        directions.append((field, held))
+        fields.append((field, held))
         remaining[held] = deflate(remaining[held], field[held], 0.0)
-    return directions
+    return fields
 
 
 def _distances(points: Array, other_points: Array) -> Array:
@@ -194,20 +195,21 @@ def symmetry_planes(
     `coordinates` (n_points, dim) are the reference coordinates of all points [length].
     """
     points = coordinates[surface.points]
-    held, driven = motions.at(surface.points), motions.driven[surface.points]
+    held, driven = motions.projectors_at(surface.points), motions.driven[surface.points]
     partly_held = np.trace(held, axis1=1, axis2=2) < points.shape[1] - 0.5
-    tolerance, planes = PLANE * float(np.ptp(points, axis=0).max()), []
+    tolerance, planes = PLANE_TOLERANCE * float(np.ptp(points, axis=0).max()), []
     normals = nodal_normals(surface, coordinates)
     for axis in _held_directions(held[partly_held]):
         x, x_opposite = points @ axis, opposite @ axis
-        components = np.abs(axis) > PLANE
+        components = np.abs(axis) > PLANE_TOLERANCE
         for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):
             if np.ptp(x) <= tolerance or (outward * (x_opposite - end) > tolerance).any():
                 continue
             nodes = np.flatnonzero(partly_held & (np.abs(x - end) <= tolerance))
             on_plane = np.einsum("d,nde,e->n", axis, held[nodes], axis) >= SAME_DIRECTION**2
             on_plane &= ~driven[nodes][:, components].any(axis=1)
-            on_plane &= np.abs(normals[nodes] @ axis) < LEANING  # otherwise the plane does not cut the surface
+            # Otherwise the plane does not cut the surface.
+            on_plane &= np.abs(normals[nodes] @ axis) < SMOOTH_INCLINATION
             if len(nodes) and on_plane.all():
                 planes.append((axis, nodes))
     return planes

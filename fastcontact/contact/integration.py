@@ -12,8 +12,9 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Nodal areas below this fraction of the mean count as zero, because the pressures at these nodes would be nearly arbitrary.
-NO_AREA = 1e-3
+# Areas below this fraction of a reference area, such as the largest nodal area, count as zero, because pressures on them
+# would be nearly arbitrary.
+NEGLIGIBLE_AREA = 1e-3
 
 
 def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
@@ -52,7 +53,7 @@ def fine_rule(element: str) -> quadrature.Rule:
     return gauss_rule(element, elements.get(element).order + 2)
 
 
-def all_nodes_carry(element: str) -> bool:
+def all_nodes_carry_pressure(element: str) -> bool:
     """Return whether a uniform pressure on a facet has compressive forces at all of its nodes.
 
     At the corners of six-node triangles the forces vanish, and at those of eight-node quadrangles they are tensile.
@@ -91,7 +92,7 @@ def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:
 def even_at_axis(surface: Surface, points: Array) -> csr_array:
     """Return the map (m, m) from the values of a field at nodes off the axis to those at all nodes.
 
-    If the end of a quadratic line lies on the axis, the integral of its shape function vanishes. The force of this node
+    If the end of a quadratic line lies on the axis, the integral of its shape function vanishes. The nodal force there
     hardly depends on the value p there: divided by the area of the facet, the force is a 60th of the difference between p and
     the value at the other end. Errors in the forces would be amplified accordingly. A smooth field is an even function of the
     radius r. Therefore p = (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2), with the values p1 and p2 at the radii r1 and r2 of the two
@@ -120,7 +121,7 @@ def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
     areas = np.zeros(len(side.points))
     for block in side.blocks:
         N, measure = areas_of_rule(block, points, axisymmetric)
-        shares = measure @ N**2
-        shares *= (measure.sum(axis=1) / shares.sum(axis=1))[:, None]
-        np.add.at(areas, block.local, shares)
+        nodal_parts = measure @ N**2
+        nodal_parts *= (measure.sum(axis=1) / nodal_parts.sum(axis=1))[:, None]
+        np.add.at(areas, block.local, nodal_parts)
     return areas

@@ -2,8 +2,10 @@ r"""Linearised contact geometry: variation of contact forces, gaps and slips wit
 
 The constraint rows depend on the displacements, because points slide over the opposite facets and normals rotate. A
 secondary point :math:`x` with the shape functions :math:`N_s` and the contact force :math:`p = \lambda n + \tau` faces the
-primary point :math:`y(\xi) = \sum_k N_k(\xi) y_k` with the normal n. A variation of the displacements
-changes the nodal forces f and the gap g of the point, in addition to their changes with constant rows, by
+primary point :math:`y(\xi) = \sum_k N_k(\xi) y_k` with the normal n. Here :math:`\lambda` is the multiplier,
+:math:`\tau` the tangential force, :math:`N` the vector of the shape functions :math:`N_k` of the primary facet, and
+:math:`{}_{,\alpha}` the derivative with respect to its reference coordinate :math:`\xi^\alpha`. A variation of the
+displacements changes the nodal forces f and the gap g of the point, in addition to their changes with constant rows, by
 
 .. math:: \delta f = N_s^T \delta p - N^T \delta p - N_{,\alpha}^T p \, \delta \xi^\alpha, \qquad
           \delta p = \lambda \, \delta n - (\tau \cdot \delta n) n, \qquad
@@ -31,14 +33,14 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, normals, tangents
 from fastcontact.contact.projection import (
-    Places,
+    FacetPoints,
+    facet_points,
     nodal_normals,
-    places,
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import nodal_rows, rows_of, scaled, shapes_at
-from fastcontact.round_off import DIFFERENCES, TINY
+from fastcontact.round_off import DIFFERENCE_STEP, TINY
 
 
 class NodalNormals:
@@ -58,10 +60,13 @@ class NodalNormals:
 
     def __init__(self, side: Surface, coordinates: Array) -> None:
         self._side, self._coordinates, self.normal = side, coordinates, nodal_normals(side, coordinates)
-        self._step = DIFFERENCES * float(np.ptp(coordinates[side.points], axis=0).max()) / np.sqrt(side.n_facets)
+        self._step = DIFFERENCE_STEP * float(np.ptp(coordinates[side.points], axis=0).max()) / np.sqrt(side.n_facets)
 
-    def along(self, du: Array) -> Array:
-        """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length]."""
+    def variation(self, du: Array) -> Array:
+        """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length].
+
+        It is computed by central differences.
+        """
         rate = (largest(du[self._side.points]) or 1.0) / self._step
         ahead = nodal_normals(self._side, self._coordinates + 0.5 / rate * du)
         behind = nodal_normals(self._side, self._coordinates - 0.5 / rate * du)
@@ -93,25 +98,25 @@ class InterpolatedNormals:
         mean = np.einsum("nk,nkd->nd", shape, self._at_nodes)
         self._length = np.linalg.norm(mean, axis=1, keepdims=True)
         self.normal, self._nodal = mean / self._length, nodal
-        self._local = shapes_at(shape, local, len(nodal.normal))
+        self._to_points = shapes_at(shape, local, len(nodal.normal))
 
     @classmethod
-    def smooth(cls, side: Surface, coordinates: Array, facet: Indices, at: Places) -> InterpolatedNormals:
-        """Return the interpolated `smooth_normals` of a side at the places `at` of its facets `facet` (n,)."""
+    def of_facets(cls, side: Surface, coordinates: Array, facet: Indices, feet: FacetPoints) -> InterpolatedNormals:
+        """Return the interpolated `smooth_normals` of a side at the points `feet` of its facets `facet` (n,)."""
         at_nodes = smooth_normals(side, coordinates)[facet]
-        return cls(NodalNormals(side, coordinates), at.local, at.shape, at_nodes)
+        return cls(NodalNormals(side, coordinates), feet.local, feet.shape, at_nodes)
 
-    def bend(self, gradient: Array) -> Array:
-        """Return the derivatives (n, dim - 1, dim) of the normals along facets.
+    def gradient(self, gradient: Array) -> Array:
+        """Return the derivatives (n, dim - 1, dim) of the normals with respect to the reference coordinates of facets [-].
 
-        `gradient` (n, k, dim - 1) contains the derivatives of the shape functions.
+        `gradient` (n, k, dim - 1) contains the derivatives of the shape functions [-].
         """
-        bend = np.einsum("nki,nkd->nid", gradient, self._at_nodes) / self._length[:, None]
-        return np.asarray(bend - np.einsum("nid,nd->ni", bend, self.normal)[:, :, None] * self.normal[:, None])
+        slope = np.einsum("nki,nkd->nid", gradient, self._at_nodes) / self._length[:, None]
+        return np.asarray(slope - np.einsum("nid,nd->ni", slope, self.normal)[:, :, None] * self.normal[:, None])
 
-    def along(self, du: Array) -> Array:
-        """See `NodalNormals.along`."""
-        return transverse(self.normal, self._local @ self._nodal.along(du)) / self._length
+    def variation(self, du: Array) -> Array:
+        """See `NodalNormals.variation`."""
+        return transverse(self.normal, self._to_points @ self._nodal.variation(du)) / self._length
 
 
 def transverse(normal: Array, vector: Array) -> Array:
@@ -125,12 +130,12 @@ class Variation(NamedTuple):
     Attributes
     ----------
     xi : ndarray (n, dim - 1)
-        Variation of the reference coordinates of the facing points [-].
+        Variation of the reference coordinates of the primary points that the points face [-].
     motion : csr_array (n, n_points)
         Variation of the matrix `motion` of the points [-].
     foot : ndarray (n, dim)
-        Variation of the positions of the facing points, on the smooth surface if there is one, due to that of xi, with fixed
-        facets [length].
+        Variation of the positions of these primary points, on the smooth surface if there is one, due to that of xi, with
+        fixed facets [length].
     normal : ndarray (n, dim)
         Variation of the normals [-].
     """
@@ -142,7 +147,9 @@ class Variation(NamedTuple):
 
 
 class _SurfacePoints:
-    """Points paired with a meshed side, and the variation of their projections and normals.
+    """Secondary points paired with a meshed side, and the variation of their projections and normals.
+
+    The facing point of a secondary point is the primary point that it faces.
 
     Parameters
     ----------
@@ -150,7 +157,7 @@ class _SurfacePoints:
     pairing : Pairing
         Pairing of the candidates with the primary side.
     rows : ndarray of int (n,)
-        Rows of the points in `candidates`.
+        Numbers of the points in `candidates`.
     primary : Surface
     coordinates : ndarray (n_points, dim)
         Coordinates of the pairing [length].
@@ -159,7 +166,7 @@ class _SurfacePoints:
     closest : bool
         Whether points face the closest points on the primary side, instead of projections along the normals. Both coincide
         for facet normals.
-    rise : ndarray (n, dim - 1), optional
+    slope : ndarray (n, dim - 1), optional
         Derivatives of the heights of a smooth primary surface above its facets with respect to reference coordinates, see
         `surface_smoothing` [length].
 
@@ -167,7 +174,7 @@ class _SurfacePoints:
     ----------
     motion : csr_array (n, n_points)
         Map from nodal vectors to the differences of their values at the points and at the facing points [-].
-    apart : ndarray (n, dim)
+    offset : ndarray (n, dim)
         Vectors from the facing points to the points [length].
     axes : ndarray (n, dim - 1, dim)
         Tangent vectors of the primary facets at the facing points [length].
@@ -179,45 +186,49 @@ class _SurfacePoints:
 
     def __init__(
         self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface, coordinates: Array,
-        normals: object, closest: bool, rise: Array | None,
+        normals: object, closest: bool, slope: Array | None,
     ) -> None:  # fmt: skip
-        feet, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
+        feet, n_points, facet = pairing.projections(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
         self.motion = shapes_at(shape, nodes, n_points)
-        self._at = feet
+        self._feet = feet
         self.axes = self._slopes(coordinates)
-        self.apart = self.motion @ coordinates
+        self.offset = self.motion @ coordinates
         self.normal, self.averaged = pairing.normal[rows], None
-        self._bend = np.zeros_like(self.axes)
-        self._facet: Array | None = None  # facet normals, where these vary
+        self._normal_gradient = np.zeros_like(self.axes)
+        self._facet_normal: Array | None = None  # None if neither the normals nor the projections depend on it
         if normals == "facet" or closest:
-            self._facet, bend = self.normal, self._facet_bend(primary, coordinates, facet, pairing.xi[rows], feet)
+            self._facet_normal = self.normal
+            facet_gradient = self._facet_normal_gradient(primary, coordinates, facet, pairing.xi[rows])
         if normals == "facet":
-            self._bend = bend
+            self._normal_gradient = facet_gradient
         elif isinstance(normals, str):
-            self.averaged = InterpolatedNormals.smooth(primary, coordinates, facet, feet)
-            self.normal, self._bend = self.averaged.normal, self.averaged.bend(feet.gradient)
+            self.averaged = InterpolatedNormals.of_facets(primary, coordinates, facet, feet)
+            self.normal, self._normal_gradient = self.averaged.normal, self.averaged.gradient(feet.gradient)
         else:
             self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
-        # With the tangent vectors a_i, the distance g along the direction d of the projection, and the motion v of points
-        # relative to the facing points, ``a_i dxi_i + g dd = dv``. The component along d is eliminated.
-        direction, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
+        # Let a_i be the tangent vectors, d the direction of the projection, g the distance along d, and dv the variation of
+        # the motion of the points relative to the facing points. Then ``a_i dxi_i + g dd = dv`` up to a multiple of d. The
+        # products with the tangents perpendicular to d eliminate this multiple.
+        direction, gradient = self.normal, self._normal_gradient
+        if closest:
+            direction, gradient = pairing.normal[rows], facet_gradient
         frame = np.stack(tangents(direction), axis=1)
-        self._closest, self._bent = closest, normals == "facet"
-        self._gap = np.einsum("nd,nd->n", self.apart, direction)[:, None]
-        inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
+        self._closest, self._has_facet_normals = closest, normals == "facet"
+        self._gap = np.einsum("nd,nd->n", self.offset, direction)[:, None]
+        inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * gradient))
         self._inverse = inverse @ frame
-        self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
+        self._foot_gradient = self.axes if slope is None else self.axes + slope[:, :, None] * self.normal[:, None]
 
-    def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, feet: Places) -> Array:
-        """Return the derivatives (n, dim - 1, dim) of facet normals along facets."""
+    def _facet_normal_gradient(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array) -> Array:
+        """Return the derivatives (n, dim - 1, dim) of facet normals with respect to reference coordinates [-]."""
         if primary.order == 1 and xi.shape[1] == 1:
             return np.zeros_like(self.axes)  # straight lines
         # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
         steps = 0.5 * np.eye(xi.shape[1])
-        above, below = ([places(primary, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0))
+        above, below = ([facet_points(primary, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0))
         second = np.stack(above, axis=3) - np.stack(below, axis=3)
-        curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[feet.nodes], self.normal)
+        curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[self._feet.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
 
     @cached_property
@@ -226,23 +237,26 @@ class _SurfacePoints:
         return np.asarray(np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes))
 
     def _slopes(self, values: Array) -> Array:
-        """Return the derivatives (n, dim - 1, dim) of a nodal field (n_points, dim) along facets at the facing points."""
-        return np.asarray(np.swapaxes(self._at.gradient, 1, 2) @ values[self._at.nodes])
+        """Return the derivatives (n, dim - 1, dim) of a nodal field (n_points, dim) at the facing points.
 
-    def along(self, du: Array) -> Variation:
+        They are those with respect to the reference coordinates of the facets.
+        """
+        return np.asarray(np.swapaxes(self._feet.gradient, 1, 2) @ values[self._feet.nodes])
+
+    def variation(self, du: Array) -> Variation:
         """Return the variation of projections and normals for a variation `du` (n_points, dim) of displacements [length]."""
-        relative_motion, tilt_of_facet = self.motion @ du, np.zeros_like(self.normal)
-        if self._facet is not None:
-            tilt = np.einsum("nid,nd->ni", self._slopes(du), self._facet)
-            tilt_of_facet = -np.einsum("nid,ni->nd", self._dual_axes, tilt)
-        at_fixed_xi = tilt_of_facet if self._bent else np.zeros_like(tilt_of_facet)
+        relative_motion, d_facet_normal = self.motion @ du, np.zeros_like(self.normal)
+        if self._facet_normal is not None:
+            tilt = np.einsum("nid,nd->ni", self._slopes(du), self._facet_normal)
+            d_facet_normal = -np.einsum("nid,ni->nd", self._dual_axes, tilt)
+        at_fixed_xi = d_facet_normal if self._has_facet_normals else np.zeros_like(d_facet_normal)
         if self.averaged is not None:
-            at_fixed_xi = self.averaged.along(du)
-        normal_variation = tilt_of_facet if self._closest else at_fixed_xi
-        xi = np.einsum("nid,nd->ni", self._inverse, relative_motion - self._gap * normal_variation)
-        foot = np.einsum("nid,ni->nd", self._foot, xi)
-        motion = shapes_at(-np.einsum("nki,ni->nk", self._at.gradient, xi), self._at.nodes, len(du))
-        return Variation(xi, motion, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
+            at_fixed_xi = self.averaged.variation(du)
+        d_direction = d_facet_normal if self._closest else at_fixed_xi
+        xi = np.einsum("nid,nd->ni", self._inverse, relative_motion - self._gap * d_direction)
+        foot = np.einsum("nid,ni->nd", self._foot_gradient, xi)
+        motion = shapes_at(-np.einsum("nki,ni->nk", self._feet.gradient, xi), self._feet.nodes, len(du))
+        return Variation(xi, motion, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi))
 
     def stiffness(self, force: Array) -> csr_array:
         r"""Return the stiffness (n_dofs, n_dofs) of constant normal forces (n,) [force] at the points [force / length].
@@ -257,9 +271,10 @@ class _SurfacePoints:
         """
         n_dofs, gap, axes = self.motion.shape[1] * self.normal.shape[1], self._gap[:, 0], range(self.axes.shape[1])
         dual = self._dual_axes
-        metric, bend = np.einsum("nid,njd->nij", dual, dual), np.einsum("nid,njd->nij", self._bend, self.axes)
-        slopes = self._at.gradient[..., None] * self.normal[:, None, None]
-        tilts = [nodal_rows(self._at.nodes, slopes[:, :, i], n_dofs) for i in axes]
+        metric = np.einsum("nid,njd->nij", dual, dual)
+        curvature = np.einsum("nid,njd->nij", self._normal_gradient, self.axes)
+        slopes = self._feet.gradient[..., None] * self.normal[:, None, None]
+        tilts = [nodal_rows(self._feet.nodes, slopes[:, :, i], n_dofs) for i in axes]
         xi = [
             rows_of(self.motion, dual[:, i]) + sum(scaled(tilts[j], gap * metric[:, i, j]) for j in axes) for i in axes
         ]
@@ -267,18 +282,18 @@ class _SurfacePoints:
         for i in axes:
             K += 2.0 * tilts[i].T @ scaled(xi[i], force)
             for j in axes:
-                K -= xi[i].T @ scaled(xi[j], force * bend[:, i, j])
+                K -= xi[i].T @ scaled(xi[j], force * curvature[:, i, j])
                 K -= tilts[i].T @ scaled(tilts[j], force * gap * metric[:, i, j])
         return csr_array(0.5 * (K + K.T))
 
 
 class _ObstaclePoints:
-    """Points paired with a rigid obstacle, which has no nodes, and the variation of their normals with their positions.
+    """Secondary points paired with a rigid obstacle, which has no nodes, and the variation of their normals.
 
     Parameters
     ----------
     secondary : csr_array (n, n_points)
-        Shape functions of the points, by node [-].
+        Values of the shape functions at the points, by node [-].
     obstacle : RigidSide
     coordinates : ndarray (n_points, dim)
         Coordinates of the pairing [length].
@@ -290,14 +305,14 @@ class _ObstaclePoints:
         self.motion, x = secondary, secondary @ coordinates
         gap, self.normal, paired, _ = obstacle.facing(x, pose)
         self._gap = np.where(paired, gap, 0.0)[:, None]
-        self.apart = self._gap * self.normal
-        step = DIFFERENCES * float(np.ptp(coordinates, axis=0).max())
-        sides = [[obstacle.facing(x + sign * step * axis, pose)[1] for sign in (1, -1)] for axis in np.eye(x.shape[1])]
-        self._gradient = np.stack([ahead - behind for ahead, behind in sides], axis=2) / (2.0 * step)
+        self.offset = self._gap * self.normal
+        step = DIFFERENCE_STEP * float(np.ptp(coordinates, axis=0).max())
+        pairs = [[obstacle.facing(x + sign * step * axis, pose)[1] for sign in (1, -1)] for axis in np.eye(x.shape[1])]
+        self._gradient = np.stack([ahead - behind for ahead, behind in pairs], axis=2) / (2.0 * step)
         self._gradient[~np.isfinite(self._gradient)] = 0.0
 
-    def along(self, du: Array) -> Variation:
-        """See `_SurfacePoints.along`; there are no reference coordinates."""
+    def variation(self, du: Array) -> Variation:
+        """See `_SurfacePoints.variation`; there are no reference coordinates."""
         motion = self.motion @ du
         normal = np.einsum("nde,ne->nd", self._gradient, motion)
         foot = transverse(self.normal, motion) - self._gap * normal
@@ -306,8 +321,8 @@ class _ObstaclePoints:
     def stiffness(self, force: Array) -> csr_array:
         """See `_SurfacePoints.stiffness`."""
         rows = [rows_of(self.motion, np.broadcast_to(axis, self.normal.shape)) for axis in np.eye(self.normal.shape[1])]
-        turned = [rows_of(self.motion, self._gradient[:, i]) for i in range(len(rows))]
-        K = -sum(row.T @ scaled(turn, force) for row, turn in zip(rows, turned, strict=True))
+        normal_rows = [rows_of(self.motion, self._gradient[:, i]) for i in range(len(rows))]
+        K = -sum(row.T @ scaled(normal_row, force) for row, normal_row in zip(rows, normal_rows, strict=True))
         return csr_array(0.5 * (K + K.T))
 
 
@@ -316,12 +331,13 @@ Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """Part q m of the relative motion, with ``q = a . o / a . m``, which closes the gap; see `Slips`.
+    """Part q m of the relative motion that closes the gap, with ``q = a . o / a . m``; see `Slips`.
 
     Attributes
     ----------
-    mean, size : ndarray (n, dim), ndarray (n, 1)
-        Mean direction m of the normals of both sides, and the length of the difference of these normals [-].
+    mean, mean_length : ndarray (n, dim), ndarray (n, 1)
+        Unit vector m along the difference of the primary and the secondary normal, which is the mean direction of the normals
+        of both sides, and the length of this difference [-].
     secondary : NodalNormals or InterpolatedNormals or None
         Normals of the secondary side; None if m is the normal of an obstacle.
     opening : ndarray (n, dim)
@@ -333,7 +349,7 @@ class Closing:
     """
 
     mean: Array
-    size: Array
+    mean_length: Array
     secondary: NodalNormals | InterpolatedNormals | None
     opening: Array
     length: Array
@@ -349,36 +365,38 @@ class Closing:
         Without a given `length` (n,), the direction a is m.
         """
         mean = primary if secondary is None else primary - secondary.normal
-        size = np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), TINY)
-        mean = mean / size
-        opening_along_mean = np.einsum("nd,nd->n", mean, opening)
-        return cls(mean, size, secondary, opening, opening_along_mean if length is None else length, length is None)
+        mean_length = np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), TINY)
+        mean = mean / mean_length
+        projected = np.einsum("nd,nd->n", mean, opening)
+        return cls(mean, mean_length, secondary, opening, projected if length is None else length, length is None)
 
     @property
     def vector(self) -> Array:
         """The vectors q m (n, dim) [length]."""
         return self.length[:, None] * self.mean
 
-    def along(self, du: Array, normal: tuple[Array, Array], primary: Array, opening: Array) -> Array:
-        """Return the variation (n, dim) of q m [length].
+    def variation(self, du: Array, normal: tuple[Array, Array], d_primary: Array, d_opening: Array) -> Array:
+        """Return the variation (n, dim) of q m for a variation `du` (n_points, dim) of the displacements [length].
 
-        `normal` contains the normals of the constraints and their variation; `primary` and `opening` are the variations of
-        the primary normals and of o, all (n, dim).
+        `normal` contains the normals of the constraints and their variation; `d_primary` and `d_opening` are the variations
+        of the primary normals and of o, all (n, dim).
         """
         mean = self.mean
-        turned = primary if self.secondary is None else primary - self.secondary.along(du)
-        d_mean = transverse(mean, turned) / self.size
+        d_difference = d_primary if self.secondary is None else d_primary - self.secondary.variation(du)
+        d_mean = transverse(mean, d_difference) / self.mean_length
         a, d_a = (mean, d_mean) if self.along_mean else normal
         cosine = np.einsum("nd,nd->n", a, mean)
-        numerator = np.einsum("nd,nd->n", d_a, self.opening) + np.einsum("nd,nd->n", a, opening)
+        numerator = np.einsum("nd,nd->n", d_a, self.opening) + np.einsum("nd,nd->n", a, d_opening)
         numerator -= self.length * (np.einsum("nd,nd->n", d_a, mean) + np.einsum("nd,nd->n", a, d_mean))
-        q = np.divide(numerator, cosine, out=np.zeros_like(cosine), where=(self.length != 0.0) & (cosine != 0.0))
-        return q[:, None] * mean + self.length[:, None] * d_mean
+        d_q = np.divide(numerator, cosine, out=np.zeros_like(cosine), where=(self.length != 0.0) & (cosine != 0.0))
+        return d_q[:, None] * mean + self.length[:, None] * d_mean
 
 
 @dataclass(frozen=True, eq=False)
 class Substitution:
-    """Additional slip along an axis in which supports hold nodes, whose functions those of their neighbours replace.
+    """Additional slip along an axis in which supports hold nodes.
+
+    In this direction, the test functions of the neighbours replace those of the held nodes.
 
     Attributes
     ----------
@@ -387,9 +405,10 @@ class Substitution:
     held : ndarray of bool (m,)
         Held nodes.
     secondary : csr_array (m, m)
-        Mean values of fields on the secondary side, minus those without the replacement.
+        Map from nodal values of a field on the secondary side to its weighted means, minus the map without the replacement
+        [-].
     functions : csr_array (m, n)
-        Mean values of fields at points, minus those without the replacement.
+        Map from the values of a field at n points to its weighted means, minus the map without the replacement [-].
     """
 
     axis: Array
@@ -406,11 +425,14 @@ class Substitution:
 
         On curved sides, the neighbours close their gaps along other normals, and this motion is not slip.
         """
-        transverse = motion - np.where(self.held[:, None], self.along_axis(motion), 0.0)
-        return self.along_axis(self.secondary @ transverse)
+        free_motion = motion - np.where(self.held[:, None], self.along_axis(motion), 0.0)
+        return self.along_axis(self.secondary @ free_motion)
 
     def slip(self, closing: Array, motion: Array) -> Array:
-        """Return the slip (m, dim) by the relative motion (n, dim) of points, of which `closing` closes gaps [length]."""
+        """Return the slip (m, dim) by the relative `motion` (n, dim) of points [length].
+
+        `closing` (m, dim) is the motion of the nodes that closes their gaps [length].
+        """
         return self.closing(closing) + self.along_axis(self.functions @ motion)
 
 
@@ -442,8 +464,9 @@ class Slips:
         Part q m; None if neither the slip nor that of `substitutions` contains it.
     symmetric : bool
         Whether q m is part of the slip at all points.
-    turning : ndarray (dim, dim), optional
-        Derivative of the motion that points share with a rotating obstacle with respect to their displacements [-].
+    rotation_gradient : ndarray (dim, dim), optional
+        Derivative of the motion that points share with a rotating obstacle with respect to their displacements, transposed
+        [-].
     substitutions : list of Substitution
         Additional slips.
     """
@@ -455,11 +478,11 @@ class Slips:
     start: Array
     closing: Closing | None = None
     symmetric: bool = True
-    turning: Array | None = None
+    rotation_gradient: Array | None = None
     substitutions: Sequence[Substitution] = ()
 
     def with_substitution(self, substitution: Substitution, motion: csr_array) -> Slips:
-        """Return the slips with an additional one; `motion` (n, n_points) is that of the points."""
+        """Return the slips with an additional one; `motion` (n, n_points) is the matrix `motion` of the points."""
         assert self.closing is not None
         total = self.total + substitution.slip(self.closing.vector, motion @ self.motion)
         return replace(self, total=total, substitutions=(*self.substitutions, substitution))
@@ -469,8 +492,8 @@ class Slips:
         """Tangential forces as vectors (n, dim) [force]."""
         return np.einsum("nk,knd->nd", self.forces, self.tangents)
 
-    def along(
-        self, du: Array, variation: Variation, points: Points, weights: csr_array | None,
+    def variation(
+        self, du: Array, d_points: Variation, points: Points, weights: csr_array | None,
         normals: tuple[Array, Array, Array],
     ) -> Array:  # fmt: skip
         """Return the variation (k, n) of slips for a variation of the displacements [length].
@@ -479,7 +502,7 @@ class Slips:
         ----------
         du : ndarray (n_points, dim)
             Variation of the displacements [length].
-        variation : Variation
+        d_points : Variation
             Variation of `points`.
         points : Points
         weights : csr_array (n, n_points) or None
@@ -487,24 +510,25 @@ class Slips:
         normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
             Normals of the constraints, their variation, and the variation of the primary normals of `closing` [-].
         """
-        motion, (normal, d_normal, primary) = variation.motion @ self.motion, normals
-        change, closing = _sums(weights, motion), np.zeros_like(normal)
+        motion, (normal, d_normal, d_primary) = d_points.motion @ self.motion, normals
+        d_slip, d_closing = _weighted(weights, motion), np.zeros_like(normal)
         if self.closing is not None:
             if self.closing.along_mean:
-                d_opening = _sums(weights, variation.motion @ self.start)
+                d_opening = _weighted(weights, d_points.motion @ self.start)
             else:  # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
-                d_opening = -change - _sums(weights, variation.foot)
-            closing = self.closing.along(du, (normal, d_normal), primary, d_opening)
-            change = change + closing if self.symmetric else change
-        if self.turning is not None:
-            change -= _sums(weights, points.motion @ du @ self.turning)
-        change += sum(substitution.slip(closing, motion) for substitution in self.substitutions)
+                d_opening = -d_slip - _weighted(weights, d_points.foot)
+            d_closing = self.closing.variation(du, (normal, d_normal), d_primary, d_opening)
+            d_slip = d_slip + d_closing if self.symmetric else d_slip
+        if self.rotation_gradient is not None:
+            d_slip -= _weighted(weights, points.motion @ du @ self.rotation_gradient)
+        d_slip += sum(substitution.slip(d_closing, motion) for substitution in self.substitutions)
         normal_part = np.einsum("nd,nd->n", normal, self.total)
         T = self.tangents
-        return np.einsum("knd,nd->kn", T, change) - np.einsum("knd,nd,n->kn", T, d_normal, normal_part)
+        return np.einsum("knd,nd->kn", T, d_slip) - np.einsum("knd,nd,n->kn", T, d_normal, normal_part)
 
 
-def _sums(weights: csr_array | None, values: Array) -> Array:
+def _weighted(weights: csr_array | None, values: Array) -> Array:
+    """Return the products of weights (m, n) and values (n, dim) at points; without weights, the values themselves."""
     return values if weights is None else np.asarray(weights @ values)
 
 
@@ -525,14 +549,16 @@ class LinearisedPoints:
         Lagrange multipliers of the constraints [force].
     tests : csr_array (m, n), optional
         Weights of the points in the mean normals, if the normals of the constraints are such means.
-    nodal : NodalNormals or Points, optional
-        Source of the normals of the constraints if they are neither means over the points nor those of the points.
+    separate_normals : NodalNormals or Points, optional
+        Nodal normals of the secondary side, or points whose normals are those of the constraints, if the latter are neither
+        means over the integration points nor the normals of these points.
     slips : Slips, optional
         Slips of the constraints; None without tangential constraints.
-    place : (ndarray of int (m,), int), optional
-        Rows of the m constraints among all constraints of the pair, and the number of all constraints.
-    smooth : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
-        Primary normals of the slips and their derivatives along facets, if they differ from the normals of the points.
+    rows_in_pair : (ndarray of int (m,), int), optional
+        Numbers of the m constraints among all constraints of the pair, and the number of all constraints.
+    slip_normals : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
+        Primary normals of the slips, and their derivatives with respect to reference coordinates, if they differ from the
+        normals of the points [-].
     compliance : Callable, optional
         Function from forces (m, dim) [force] to elastic displacements (m, dim) of the constraints [length], if the compliance
         couples vectors. Their components along normals and tangents change as these rotate.
@@ -544,39 +570,39 @@ class LinearisedPoints:
     normal: Array
     multiplier: Array
     tests: csr_array | None = None
-    nodal: NodalNormals | Points | None = None
+    separate_normals: NodalNormals | Points | None = None
     slips: Slips | None = None
-    place: tuple[Indices, int] | None = None
-    smooth: tuple[InterpolatedNormals, Array] | None = None
+    rows_in_pair: tuple[Indices, int] | None = None
+    slip_normals: tuple[InterpolatedNormals, Array] | None = None
     compliance: Callable[[Array], Array] | None = None
 
-    def along(self, du: Array) -> tuple[Array, Array]:
+    def derivatives_along(self, du: Array) -> tuple[Array, Array]:
         """See `constraints.Linearised`."""
-        varied = self.points.along(du)
-        normal = self._normals(du, varied.normal)
-        gaps = np.einsum("md,md->m", _sums(self.functions, self.points.apart), normal)[None]
-        gaps -= np.einsum("md,md->m", self.normal, _sums(self.functions, varied.foot))
+        d_points = self.points.variation(du)
+        d_normal = self._normal_variation(du, d_points.normal)
+        d_gaps = np.einsum("md,md->m", _weighted(self.functions, self.points.offset), d_normal)[None]
+        d_gaps -= np.einsum("md,md->m", self.normal, _weighted(self.functions, d_points.foot))
+        d_force, d_tangential = self.multiplier[:, None] * d_normal, np.zeros_like(d_normal)
         if self.slips is not None:
-            primary = normal
-            if self.smooth is not None:
-                turned = self.smooth[0].along(du) + np.einsum("nid,ni->nd", self.smooth[1], varied.xi)
-                primary = _sums(self.functions, turned)
-            normals = self.normal, normal, primary
-            gaps = np.vstack([gaps, self.slips.along(du, varied, self.points, self.functions, normals)])
-        force, tangential = self.multiplier[:, None] * normal, np.zeros_like(normal)
-        if self.slips is not None:
-            tangential = -np.einsum("md,md->m", self.slips.force, normal)[:, None] * self.normal
-        if self.compliance is not None and self.slips is not None:
-            gaps += self._elastic(normal, force + tangential)
-        if self.place is not None:
-            rows, of_rows = self.place[0], gaps
-            gaps = np.zeros((len(gaps), self.place[1]))
-            gaps[:, rows] = of_rows
-        return self._to_nodes @ self._at_points(force, tangential) + varied.motion.T @ self._force, gaps
+            d_primary = d_normal
+            if self.slip_normals is not None:
+                averaged, gradient = self.slip_normals
+                d_averaged = averaged.variation(du) + np.einsum("nid,ni->nd", gradient, d_points.xi)
+                d_primary = _weighted(self.functions, d_averaged)
+            normals = self.normal, d_normal, d_primary
+            d_gaps = np.vstack([d_gaps, self.slips.variation(du, d_points, self.points, self.functions, normals)])
+            d_tangential = -np.einsum("md,md->m", self.slips.force, d_normal)[:, None] * self.normal
+            if self.compliance is not None:
+                d_gaps += self._elastic_variation(d_normal, d_force + d_tangential)
+        if self.rows_in_pair is not None:
+            (rows, count), d_paired_gaps = self.rows_in_pair, d_gaps
+            d_gaps = np.zeros((len(d_gaps), count))
+            d_gaps[:, rows] = d_paired_gaps
+        return self._to_nodes @ self._at_points(d_force, d_tangential) + d_points.motion.T @ self._force, d_gaps
 
     @cached_property
     def _to_nodes(self) -> csc_array:
-        """Map (n_points, n) from forces at the points to nodal forces."""
+        """Map (n_points, n) from forces at the points to nodal forces [-]."""
         return self.points.motion.T
 
     def _at_points(self, normal: Array, tangential: Array) -> Array:
@@ -587,15 +613,15 @@ class LinearisedPoints:
         substitutions = () if self.slips is None else self.slips.substitutions
         return sum((s.functions.T @ s.along_axis(tangential) for s in substitutions), force)
 
-    def _elastic(self, normal: Array, force: Array) -> Array:
+    def _elastic_variation(self, d_normal: Array, d_force: Array) -> Array:
         """Return the variation (1 + k, m) of elastic gaps and slips [length] due to those of normals and forces (m, dim)."""
         assert self.compliance is not None
         assert self.slips is not None
-        elastic, d_elastic = self._elastic_displacements, self.compliance(force)
-        gaps = np.einsum("md,md->m", normal, elastic) + np.einsum("md,md->m", self.normal, d_elastic)
-        slips = np.einsum("kmd,md->km", self.slips.tangents, d_elastic)
-        slips -= np.einsum("kmd,md->km", self.slips.tangents, normal) * np.einsum("md,md->m", self.normal, elastic)
-        return np.vstack([gaps, slips])
+        elastic, d_elastic = self._elastic_displacements, self.compliance(d_force)
+        d_gaps = np.einsum("md,md->m", d_normal, elastic) + np.einsum("md,md->m", self.normal, d_elastic)
+        d_slips = np.einsum("kmd,md->km", self.slips.tangents, d_elastic)
+        d_slips -= np.einsum("kmd,md->km", self.slips.tangents, d_normal) * np.einsum("md,md->m", self.normal, elastic)
+        return np.vstack([d_gaps, d_slips])
 
     @cached_property
     def _elastic_displacements(self) -> Array:
@@ -616,18 +642,18 @@ class LinearisedPoints:
 
     @cached_property
     def _length(self) -> Array:
-        """Lengths (m, 1) of the mean vectors whose directions are the normals."""
+        """Lengths (m, 1) of the weighted sums of the normals at the points; 1 where the sum vanishes."""
         length = np.linalg.norm(self._mean(self.points.normal), axis=1, keepdims=True)
         return np.where(length > 0.0, length, 1.0)
 
-    def _normals(self, du: Array, at_points: Array) -> Array:
+    def _normal_variation(self, du: Array, at_points: Array) -> Array:
         """Return the variation (m, dim) of the normals of the constraints, given the variation (n, dim) at the points."""
         if self.tests is None:
-            return _sums(self.functions, at_points)
-        if isinstance(self.nodal, NodalNormals):
-            return -self.nodal.along(du)
-        if self.nodal is not None:
-            return self.nodal.along(du).normal
+            return _weighted(self.functions, at_points)
+        if isinstance(self.separate_normals, NodalNormals):
+            return -self.separate_normals.variation(du)
+        if self.separate_normals is not None:
+            return self.separate_normals.variation(du).normal
         return transverse(self.normal, self._mean(at_points)) / self._length
 
     def _mean(self, vectors: Array) -> Array:
@@ -648,65 +674,67 @@ class Differences:
     Attributes
     ----------
     constraints : Constraints
-    moved : Callable
-        Function that moves all points by (n_points, dim) [length] after the pairing of `constraints`, and pairs them again.
+    constraints_after : Callable
+        Function from a motion (n_points, dim) [length] of all points after the pairing of `constraints` to the constraints of
+        a new pairing.
     forces : (ndarray (m,), ndarray (m, k))
         Multipliers and tangential forces of the solution with `constraints` [force].
     motions : (ndarray (n_points, dim), ndarray (n_points, dim), ndarray (n_points, dim))
         Displacements of the solution, their increments in the load step, and their changes since the pairing [length].
-    sides : ndarray of int (q,)
+    points_of_sides : ndarray of int (q,)
         Points on which the constraints depend.
     step : float
         Largest motion of these points in a difference [length].
     """
 
     constraints: Constraints
-    moved: Callable[[Array], Constraints]
+    constraints_after: Callable[[Array], Constraints]
     forces: tuple[Array, Array]
     motions: tuple[Array, Array, Array]
-    sides: NDArray[np.integer]
+    points_of_sides: NDArray[np.integer]
     step: float
 
-    def along(self, du: Array) -> tuple[Array, Array]:
+    def derivatives_along(self, du: Array) -> tuple[Array, Array]:
         """See `constraints.Linearised`."""
-        rate = (largest(du[self.sides]) or 1.0) / self.step
-        force, gaps = (rate * (moved - mean) for moved, mean in zip(self._values(du / rate), self._mean, strict=True))
-        return force.reshape(du.shape), gaps
+        rate = (largest(du[self.points_of_sides]) or 1.0) / self.step
+        d_force, d_gaps = (rate * (y - y0) for y, y0 in zip(self._values(du / rate), self._values_at_mean, strict=True))
+        return d_force.reshape(du.shape), d_gaps
 
     @cached_property
-    def _mean(self) -> tuple[Array, Array]:
+    def _values_at_mean(self) -> tuple[Array, Array]:
         return self._values(np.zeros_like(self.motions[0]))
 
     def _values(self, motion: Array) -> tuple[Array, Array]:
-        """Return nodal forces (n_dofs,) [force], and gaps and slips (1 + k, m) [length], for a motion from the mean.
+        """Return nodal forces (n_dofs,) [force], and gaps and slips (1 + k, m) [length].
 
-        Tangents follow the normals.
+        They are those after a `motion` (n_points, dim) from the mean of the displacements [length]. The tangents of
+        `constraints` are rotated from its normals to the new ones by the smallest rotation.
         """
         (multiplier, tangential), (displacement, increment, change) = self.forces, self.motions
-        varied = self.moved(0.5 * change + motion)
+        varied = self.constraints_after(0.5 * change + motion)
         gap = varied.gaps(displacement)[None]
         if not varied.tangents:
             return varied.force(multiplier), gap
         tangents = self.constraints.directions
         normal0, normal = normals(tangents), normals(varied.directions)
-        mean = (normal0 + normal) / (1.0 + np.einsum("md,md->m", normal0, normal))[:, None]
-        t0 = [t - np.einsum("md,md->m", t, normal)[:, None] * mean for t in tangents]
-        rotation = np.einsum("kmd,jmd->mkj", varied.directions, t0)
+        scaled_sum = (normal0 + normal) / (1.0 + np.einsum("md,md->m", normal0, normal))[:, None]
+        rotated = [t - np.einsum("md,md->m", t, normal)[:, None] * scaled_sum for t in tangents]
+        rotation = np.einsum("kmd,jmd->mkj", varied.directions, rotated)
         slip = np.stack([T @ increment.ravel() for T in varied.tangents]) + varied.slip0
         force = varied.force(multiplier, np.einsum("mkj,mj->mk", rotation, tangential))
         return force, np.vstack([gap, np.einsum("mkj,km->jm", rotation, slip)])
 
 
-def faced(
+def paired_points(
     candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
-    normals: object, pose: Pose, closest: bool = False, rise: Array | None = None,
+    normals: object, pose: Pose, closest: bool = False, slope: Array | None = None,
 ) -> Points:  # fmt: skip
-    """Return the paired points in the rows `rows` (n,) of `pairing`, with the variation of their projections.
+    """Return the paired candidates with the numbers `rows` (n,), and the variation of their projections.
 
     The pairing was computed at `coordinates` (n_points, dim) [length]. `pose` applies to obstacles. `normals`, `closest` and
-    `rise` apply to meshed primary sides, see `_SurfacePoints`.
+    `slope` apply to meshed primary sides, see `_SurfacePoints`.
     """
     if not isinstance(primary, RigidSide):
-        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest, rise)
+        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest, slope)
     shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates))
     return _ObstaclePoints(shapes, primary, coordinates, pose)

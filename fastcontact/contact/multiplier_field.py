@@ -13,7 +13,7 @@ from scipy.sparse.linalg import SuperLU
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
-from fastcontact.linear.delassus import MOST_ROWS
+from fastcontact.linear.delassus import MAX_ROWS
 from fastcontact.linear.field_compliance import FieldCompliance
 
 
@@ -52,7 +52,7 @@ class Projection:
         ContactError
             If the matrix is too large to be factorised.
         """
-        if len(rows) > MOST_ROWS:
+        if len(rows) > MAX_ROWS:
             raise ContactError(
                 f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a "
                 f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='mortar' with "
@@ -65,24 +65,24 @@ class Projection:
         inverse = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
         return (np.diag(inverse) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
 
-    def among(self, rows: Indices) -> Array | FieldCompliance:
-        """Return the compliance of the points `rows` (q,) in a form for linear solvers; see `Compliance.among`."""
+    def block_operator(self, rows: Indices) -> Array | FieldCompliance:
+        """Return the compliance of the points `rows` (q,) for linear solvers; see `Compliance.block_operator`."""
         if not self.eliminable or self.mass is None or not (self.areas[rows] > 0).all():
             return self.block(rows)
-        other_weights = np.where(self.areas > 0, self.areas, 0.0) / self.rho
-        other_weights[rows] = 0.0
-        mass_of_others, areas = csr_array(self.P.T @ diags_array(other_weights) @ self.P), self.areas[rows]
-        mass_of_others.eliminate_zeros()
+        weights = np.where(self.areas > 0, self.areas, 0.0) / self.rho
+        weights[rows] = 0.0
+        mass_of_other_points, areas = csr_array(self.P.T @ diags_array(weights) @ self.P), self.areas[rows]
+        mass_of_other_points.eliminate_zeros()
         P, stiffness = csr_array(self.P[rows]), self.rho * areas
-        return FieldCompliance(P, areas, stiffness, mass_of_others, lambda: self.block(rows), self.quadratic)
+        return FieldCompliance(P, areas, stiffness, mass_of_other_points, lambda: self.block(rows), self.quadratic)
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C @ multiplier`` [length] for point forces (m,) or (m, dim) [force]."""
         forces = multiplier if multiplier.ndim == 2 else multiplier[:, None]
         areas, with_area = self.areas[:, None], self.areas[:, None] > 0
         pressure = np.divide(forces, areas, out=np.zeros_like(forces), where=with_area)
-        elastic = np.where(with_area, pressure - self.P @ self.field(np.where(with_area, forces, 0.0)), 0.0)
-        return elastic.reshape(multiplier.shape) / self.rho
+        remainder = np.where(with_area, pressure - self.P @ self.field(np.where(with_area, forces, 0.0)), 0.0)
+        return remainder.reshape(multiplier.shape) / self.rho
 
     def field(self, multiplier: Array) -> Array:
         """Return the independent values (k, ...) of the multiplier field [pressure] for point forces (m, ...) [force]."""

@@ -12,15 +12,18 @@ from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
 # Overclosure, in multiples of the clearance c0, beyond which the exponential law is linear.
-FARTHEST = 3.0
+LARGEST_OVERCLOSURE = 3.0
 
 
 class OverclosureLaw(ABC):
     """Contact pressure as a function of the overclosure, which is minus the gap."""
 
     @abstractmethod
-    def line(self, overclosure: Array) -> tuple[Array, Array]:
-        """Return slopes (m,) [pressure / length] and zeros (m,) [length] of the tangents at overclosures (m,) [length]."""
+    def tangent(self, overclosure: Array) -> tuple[Array, Array]:
+        """Return slopes (m,) [pressure / length] and zeros (m,) [length] of the tangents at overclosures (m,) [length].
+
+        The zero of a tangent is the overclosure at which its pressure vanishes.
+        """
 
     @abstractmethod
     def energy(self, pressure: Array) -> Array:
@@ -53,8 +56,8 @@ class TabularLaw(OverclosureLaw):
         self.table = rows
         self._slopes = np.diff(rows[:, 1]) / np.diff(rows[:, 0])
 
-    def line(self, overclosure: Array) -> tuple[Array, Array]:
-        """See `OverclosureLaw.line`."""
+    def tangent(self, overclosure: Array) -> tuple[Array, Array]:
+        """See `OverclosureLaw.tangent`."""
         interval = np.clip(np.searchsorted(self.table[:, 0], overclosure, side="right") - 1, 0, len(self._slopes) - 1)
         return self._slopes[interval], self.table[interval, 0] - self.table[interval, 1] / self._slopes[interval]
 
@@ -81,15 +84,15 @@ class ExponentialLaw(OverclosureLaw):
     def __init__(self, clearance: float, pressure: float) -> None:
         self._clearance, self._pressure, self._rate = clearance, pressure, np.log(100.0) / clearance
 
-    def line(self, overclosure: Array) -> tuple[Array, Array]:
-        """See `OverclosureLaw.line`."""
-        h = np.clip(overclosure, -self._clearance, FARTHEST * self._clearance)
+    def tangent(self, overclosure: Array) -> tuple[Array, Array]:
+        """See `OverclosureLaw.tangent`."""
+        h = np.clip(overclosure, -self._clearance, LARGEST_OVERCLOSURE * self._clearance)
         return self._rate * self._pressure * np.exp(self._rate * h), h - 1.0 / self._rate
 
     def energy(self, pressure: Array) -> Array:
         """See `OverclosureLaw.energy`."""
-        ends = self._pressure * np.exp(self._rate * self._clearance * np.array([-1.0, FARTHEST]))
-        p, exponential_part = np.maximum(pressure, 0.0), np.clip(pressure, *ends)
-        below, beyond = np.minimum(p, ends[0]), np.maximum(p, ends[1])
-        linear_parts = 0.5 * below**2 / ends[0] + 0.5 * (beyond**2 - ends[1] ** 2) / ends[1]
-        return np.asarray((linear_parts + exponential_part - ends[0]) / self._rate)
+        low, high = self._pressure * np.exp(self._rate * self._clearance * np.array([-1.0, LARGEST_OVERCLOSURE]))
+        p, exponential_part = np.maximum(pressure, 0.0), np.clip(pressure, low, high)
+        below, beyond = np.minimum(p, low), np.maximum(p, high)
+        linear_parts = 0.5 * below**2 / low + 0.5 * (beyond**2 - high**2) / high
+        return np.asarray((linear_parts + exponential_part - low) / self._rate)

@@ -1,4 +1,4 @@
-"""Options of a contact pair that all formulations share: clearance, excluded nodes, kind of contact, penalty."""
+"""Options of a contact pair that do not depend on its formulation, such as clearance, excluded nodes, kind and penalty."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class PairOptions:
         Nodes at the source of a penetrating fluid; None without fluid.
     representatives : ndarray of int (n_points,), optional
         In periodic models, the node with which each node shares its multiplier.
-    turning : Rotation, optional
+    sector_rotation : Rotation, optional
         Rotation about the axis of a cyclic sector. Fields of tractions are then interpolated in cylindrical components,
         because tractions rotate from one end of the pair to the other.
     """
@@ -81,7 +81,7 @@ class PairOptions:
     cohesion: CohesiveLaw | None = None
     source: Mask | None = None
     representatives: Indices | None = None
-    turning: Rotation | None = None
+    sector_rotation: Rotation | None = None
 
     def friction_axes(
         self, friction: float, directions: Sequence[Array], candidates: Candidates
@@ -120,16 +120,16 @@ class PairOptions:
         return np.full(len(is_frictionless), friction), rotated, (np.where(has_direction, 0.0, first), *rotated[1:])
 
 
-def nodal_map(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
+def nodal_map(side: Surface, excluded: Mask, independent: Indices) -> csr_array:
     """Return the map (m, m) from independent to nodal values of a multiplier field, for a side with `excluded` nodes (m,).
 
-    The value at an excluded node is the mean of the values at its neighbours among the nodes `givers`. A uniform field
+    The value at an excluded node is the mean of the values at its neighbours among the nodes `independent`. A uniform field
     therefore remains uniform. It is zero if there are no such neighbours. All other nodal values are independent.
     """
     m = len(side.points)
     if not excluded.any():
         return csr_array(eye_array(m, format="csr"))
-    is_giver = np.isin(np.arange(m), givers) & ~excluded
-    neighbours = diags_array(excluded.astype(float)) @ side.beside @ diags_array(is_giver.astype(float))
+    is_independent = np.isin(np.arange(m), independent) & ~excluded
+    neighbours = diags_array(excluded.astype(float)) @ side.node_adjacency @ diags_array(is_independent.astype(float))
     count = np.maximum(np.asarray(neighbours.sum(axis=1)).ravel(), 1.0)
     return csr_array(diags_array((~excluded).astype(float)) + diags_array(1.0 / count) @ neighbours)

@@ -16,15 +16,15 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
     Closest,
-    Places,
+    FacetPoints,
     along_line_normals,
     along_normals,
-    closest_of_kinds,
+    closest_of_types,
     distance_from_edges,
+    facet_points,
     interpolate,
     nodal_normals,
     normals_at_nodes,
-    places,
     smooth_ends,
     smooth_normals,
 )
@@ -38,7 +38,13 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 # after the other. With a smaller tolerance, nodes near the edge alternate between paired and unpaired.
 OVERHANG = 0.5
 # Fraction of each facet over which its normals vary towards an edge if edges are rounded.
-ROUNDED = 0.1
+ROUNDED_FRACTION = 0.1
+# Cosine of the angle, about 84 degrees, between a normal and the opposite of the other normal beyond which two sides do not
+# face each other. It is also the length of the mean unit normal below which a surface, because it is closed, has no mean
+# direction.
+FACING = 0.1
+Normals: TypeAlias = str | Sequence[float]
+KINDS = ("facet", "averaged", "secondary")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +70,9 @@ class Candidates:
 
     @classmethod
     def inside(cls, side: Surface, xi: Sequence[Array]) -> Candidates:
-        """Return candidates at the same reference coordinates in all facets of a block.
+        """Return candidates at the same reference coordinates `xi` in all facets of a block.
 
-        `xi` is a list of arrays (n_q, dim - 1), one for each block of `side`.
+        `xi` contains an array (n_q, dim - 1) for each block of `side` [-].
         """
         facet = np.repeat(np.arange(side.n_facets), np.repeat([len(of_block) for of_block in xi], side.sizes))
         blocks = list(zip(side.blocks, side.sizes, xi, strict=True))
@@ -121,7 +127,7 @@ class Pairing:
         Gap minus ``normal . x``, where x is the position of the candidate, for a rigid obstacle [length]; None for facets.
     beyond : ndarray (n, dim - 1), optional
         Overhang of the candidate beyond the end of the primary surface, in reference coordinates of the facet whose straight
-        extension the candidate faces [-]; None if no candidate overhangs.
+        extension the candidate faces [-]; zero for other candidates, and None if no candidate overhangs.
     """
 
     facet: Indices
@@ -131,15 +137,15 @@ class Pairing:
     offset: Array | None = None
     beyond: Array | None = None
 
-    def places(self, primary: Surface, rows: Indices) -> Places:
+    def projections(self, primary: Surface, rows: Indices) -> FacetPoints:
         """Return the projections of the candidates `rows` (q,) onto `primary`.
 
         Candidates beyond the end of the primary surface are projected onto the straight extension of their facet.
         """
-        points = places(primary, self.facet[rows], self.xi[rows])
+        feet = facet_points(primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
-            return points
-        return replace(points, shape=points.shape + np.einsum("nkj,nj->nk", points.gradient, self.beyond[rows]))
+            return feet
+        return replace(feet, shape=feet.shape + np.einsum("nkj,nj->nk", feet.gradient, self.beyond[rows]))
 
 
 def pair(
@@ -182,7 +188,7 @@ def pair(
         _, normal, paired, offset = primary.facing(candidates, pose)
         no_facet = np.zeros(len(candidates), np.intp)
         return Pairing(no_facet, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
-    closest = closest_of_kinds(candidates, primary.node_positions(coordinates))
+    closest = closest_of_types(candidates, primary.node_positions(coordinates))
     if normals == "facet" and not rounded:
         at_smooth_end = _at_smooth_ends(primary, coordinates, closest)
         paired = closest.overhang <= np.where(at_smooth_end, max(projection_tolerance, OVERHANG), projection_tolerance)
@@ -218,11 +224,11 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
     xi : ndarray (n, dim - 1)
         Reference coordinates in the facet [-].
     mean : ndarray (n, dim)
-        Averaged normals at the points, which are the result at edges [-]. Over the fraction ROUNDED of the facet, the result
+        Averaged normals at the points, which are the result at edges [-]. Over ROUNDED_FRACTION of the facet, the result
         changes to the normal of the facet.
     """
-    normals = interpolate(normals_at_nodes(primary, coordinates)[facet], places(primary, facet, xi))
-    weight = np.clip(1.0 - distance_from_edges(primary, facet, xi) / ROUNDED, 0.0, 1.0)[:, None]
+    normals = interpolate(normals_at_nodes(primary, coordinates)[facet], facet_points(primary, facet, xi))
+    weight = np.clip(1.0 - distance_from_edges(primary, facet, xi) / ROUNDED_FRACTION, 0.0, 1.0)[:, None]
     normal = weight * mean + (1.0 - weight) * normals
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
@@ -234,7 +240,7 @@ def _with_overhang(
     rows = np.flatnonzero(overhangs)
     if not len(rows):
         return pairing
-    feet = places(primary, pairing.facet[rows], pairing.xi[rows])
+    feet = facet_points(primary, pairing.facet[rows], pairing.xi[rows])
     nodes = coordinates[feet.nodes]
     offset = candidates[rows] - np.einsum("nk,nkd->nd", feet.shape, nodes)
     basis = np.concatenate([np.einsum("nkj,nkd->ndj", feet.gradient, nodes), pairing.normal[rows][:, :, None]], axis=2)
@@ -290,9 +296,10 @@ def gap_rows(
 def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     """Return unit tangents (n, dim) that form an orthonormal basis with the unit normals `normal` (n, dim).
 
-    There is one tangent in 2D, and there are two in 3D. In 3D two axes perpendicular to the mean normal are rotated to each
-    point by the smallest rotation from the mean normal to the normal. Tangents then vary as smoothly as normals, so that
-    components of tractions along them can be interpolated. The choice of the first axis does not matter.
+    There is one tangent in 2D, and there are two in 3D. In 3D an axis perpendicular to the mean normal is rotated at each
+    point by the smallest rotation from the mean normal to the normal, and the second tangent completes the basis. Tangents
+    then vary as smoothly as normals, so that components of tractions along them can be interpolated. The choice of the first
+    axis does not matter.
 
     `held` (n, 3, 3) are projectors onto the directions in which supports hold displacements. If they are given, the tangents
     are rotated about the normal so that the first one lies as far as possible in these directions.
@@ -312,7 +319,7 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(normal, first)
-    if held is not None:
+    if held is not None:  # the principal axis of the projector in the tangent plane
         pairs = (first, first), (first, second), (second, second)
         ff, fs, ss = (np.einsum("nd,nde,ne->n", a, held, b) for a, b in pairs)
         angle = 0.5 * np.arctan2(2 * fs, ff - ss)[:, None]
@@ -340,7 +347,7 @@ def rows_along(
     rows = np.flatnonzero(pairing.paired)
     nodes, weights = candidates.nodes[rows], candidates.shape[rows]
     if not isinstance(primary, RigidSide):
-        feet = pairing.places(primary, rows)
+        feet = pairing.projections(primary, rows)
         nodes, weights = np.hstack([nodes, feet.nodes]), np.hstack([weights, -feet.shape])
     values = weights[:, :, None] * direction[rows][:, None, :]
     columns = nodes[:, :, None] * dim + np.arange(dim)
@@ -348,13 +355,6 @@ def rows_along(
     matrix = csr_array((values.ravel(), columns.ravel(), start), shape=(len(candidates.nodes), n_dofs))
     matrix.sum_duplicates()
     return matrix
-
-
-Normals: TypeAlias = str | Sequence[float]
-KINDS = ("facet", "averaged", "secondary")
-# Cosine of the angle, about 84 degrees, beyond which two sides do not face each other. It is also the length of the mean unit
-# normal below which a surface has no mean direction, because it is closed.
-FACING = 0.1
 
 
 def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSide) -> str | tuple[float, ...]:

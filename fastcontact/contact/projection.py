@@ -38,7 +38,7 @@ SMALL_OVERHANG = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class FacetPoints:
     """Points of a surface, given by their facets and reference coordinates.
 
     k is the largest number of nodes of a facet.
@@ -60,14 +60,14 @@ class Places:
     gradient: Array
 
 
-def places(side: Surface, facet: Indices, xi: Array) -> Places:
+def facet_points(side: Surface, facet: Indices, xi: Array) -> FacetPoints:
     """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) in the facets numbered `facet` (n,)."""
     nodes = side.all_facets[facet]
     shape, gradient = np.zeros(nodes.shape), np.zeros((*nodes.shape, xi.shape[1]))
     for block, (rows, _) in zip(side.blocks, by_block(facet, side.sizes), strict=True):
         element, n = elements.get(block.element), block.facets.shape[1]
         shape[rows, :n], gradient[rows, :n] = element.shape(xi[rows]), element.gradient(xi[rows])
-    return Places(nodes, side.all_local[facet], shape, gradient)
+    return FacetPoints(nodes, side.all_local[facet], shape, gradient)
 
 
 def facets_containing(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, Indices, Array]:
@@ -90,16 +90,16 @@ def facets_containing(side: Surface, facet: Indices, xi: Array) -> tuple[Indices
     xi : ndarray (p, dim - 1)
         Reference coordinates of the point in the facet [-].
     """
-    origin = places(side, facet, xi)
-    row, k = np.nonzero(np.abs(origin.shape) > LENGTH_ROUND_OFF)
-    nodes_of_points = csr_array((np.ones(len(row)), (row, origin.local[row, k])), shape=(len(facet), len(side.points)))
+    points = facet_points(side, facet, xi)
+    row, k = np.nonzero(np.abs(points.shape) > LENGTH_ROUND_OFF)
+    nodes_of_points = csr_array((np.ones(len(row)), (row, points.local[row, k])), shape=(len(facet), len(side.points)))
     common = coo_array(nodes_of_points @ side.incidence.T)
     contains_all = common.data == np.diff(nodes_of_points.indptr)[common.row]
     point, common_facet = common.row[contains_all].astype(np.intp), common.col[contains_all].astype(np.intp)
     coordinates = np.empty((len(point), xi.shape[1]))
     for block, (rows, number) in zip(side.blocks, by_block(common_facet, side.sizes), strict=True):
-        same = block.local[number][:, :, None] == origin.local[point[rows]][:, None]
-        coordinates[rows] = np.einsum("pkj,pj->pk", same, origin.shape[point[rows]]) @ elements.get(block.element).nodes
+        same = block.local[number][:, :, None] == points.local[point[rows]][:, None]
+        coordinates[rows] = np.einsum("pkj,pj->pk", same, points.shape[point[rows]]) @ elements.get(block.element).nodes
     return point, common_facet, coordinates
 
 
@@ -133,17 +133,18 @@ def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) ->
     normals, weights = normals_at_nodes(side, coordinates), _weights(side, coordinates)
     smooth, normal, weight = _nodal_means(side, normals, weights)[node], normals.reshape(-1, dim), weights.ravel()
     # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
-    distinct = np.flatnonzero(side.node_weights)
-    deviates = np.einsum("pd,pd->p", normal[distinct], smooth[distinct]) < np.cos(np.radians(0.5 * corner))
+    entries = np.flatnonzero(side.node_weights)  # without repeated nodes
+    deviates = np.einsum("pd,pd->p", normal[entries], smooth[entries]) < np.cos(np.radians(0.5 * corner))
     if not deviates.any():
         return smooth.reshape(*side.all_local.shape, dim)
-    by_node = distinct[np.argsort(node[distinct], kind="stable")]
-    start = np.append(0, np.cumsum(np.bincount(node[distinct])))
-    for node_at_corner in np.unique(node[distinct[deviates]]):
-        entries = by_node[start[node_at_corner] : start[node_at_corner + 1]]
-        similar = normal[entries] @ normal[entries].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
-        total = (similar * weight[entries]) @ normal[entries]
-        smooth[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
+    nodes_at_corners = np.unique(node[entries[deviates]])
+    by_node = entries[np.argsort(node[entries], kind="stable")]
+    start = np.append(0, np.cumsum(np.bincount(node[entries])))
+    for node_at_corner in nodes_at_corners:
+        at_node = by_node[start[node_at_corner] : start[node_at_corner + 1]]
+        is_smooth = normal[at_node] @ normal[at_node].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
+        total = (is_smooth * weight[at_node]) @ normal[at_node]
+        smooth[at_node] = total / np.linalg.norm(total, axis=1, keepdims=True)
     return smooth.reshape(*side.all_local.shape, dim)
 
 
@@ -185,7 +186,7 @@ def _weights(side: Surface, coordinates: Array) -> Array:
     return padded(weights)
 
 
-def interpolate(normals: Array, points: Places) -> Array:
+def interpolate(normals: Array, points: FacetPoints) -> Array:
     """Return unit normals (n, dim) at points, interpolated between the normals (n, k, dim) at the nodes of their facets."""
     normal = np.einsum("nk,nkd->nd", points.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
@@ -225,16 +226,16 @@ def closest(points: Array, nodes: Array) -> Closest:
         np.empty(n, np.intp), np.empty((n, dim - 1)), np.empty((n, dim)), np.empty(n), np.empty((n, dim)), np.empty(n)
     )
     if dim == 2:
-        _on_lines(points, nodes, result)
+        _project_onto_lines(points, nodes, result)
     else:
-        _on_faces(points, nodes, result)
-    wrong = np.flatnonzero(np.isnan(result.distance))
-    if len(wrong):
-        _raise_failure(points[wrong], result.facet[wrong], nodes)
+        _project_onto_faces(points, nodes, result)
+    failed = np.flatnonzero(np.isnan(result.distance))
+    if len(failed):
+        _raise_failure(points[failed], result.facet[failed], nodes)
     return result
 
 
-def closest_of_kinds(points: Array, nodes_by_type: Sequence[Array]) -> Closest:
+def closest_of_types(points: Array, nodes_by_type: Sequence[Array]) -> Closest:
     """Project points onto the closest facet of several element types.
 
     `nodes_by_type` contains the `nodes` of `closest` for each type. Facets are numbered consecutively through all types.
@@ -242,13 +243,14 @@ def closest_of_kinds(points: Array, nodes_by_type: Sequence[Array]) -> Closest:
     if len(nodes_by_type) == 1:
         return closest(points, nodes_by_type[0])
     first = np.cumsum([0] + [len(nodes) for nodes in nodes_by_type])
-    by_kind = [closest(points, nodes) for nodes in nodes_by_type]
-    nearest = np.argmin([candidate.distance for candidate in by_kind], axis=0)
-    facet, *other_fields = (np.stack(values)[nearest, np.arange(len(points))] for values in zip(*by_kind, strict=True))
+    by_type = [closest(points, nodes) for nodes in nodes_by_type]
+    nearest = np.argmin([candidate.distance for candidate in by_type], axis=0)
+    facet, *other_fields = (np.stack(values)[nearest, np.arange(len(points))] for values in zip(*by_type, strict=True))
     return Closest(facet + first[nearest], *other_fields)
 
 
-def _on_lines(points: Array, nodes: Array, closest: Closest) -> None:
+def _project_onto_lines(points: Array, nodes: Array, closest: Closest) -> None:
+    """Fill `closest` with the projections onto lines; the arguments are those of the function `closest`."""
     numbers, order = tree_order(nodes[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
     nodes = nodes[numbers]
     hull = nodes
@@ -262,7 +264,8 @@ def _on_lines(points: Array, nodes: Array, closest: Closest) -> None:
     )
 
 
-def _on_faces(points: Array, nodes: Array, closest: Closest) -> None:
+def _project_onto_faces(points: Array, nodes: Array, closest: Closest) -> None:
+    """Fill `closest` with the projections onto faces; the arguments are those of the function `closest`."""
     from fastcontact.contact.search import facets_3d_kernels, search_3d_kernels
     from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 
@@ -330,9 +333,9 @@ def along_normals(
     centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
     relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in side.blocks]
-    of_blocks = zip(np.split(normals, np.cumsum(side.sizes)[:-1]), nodes_of_blocks, strict=True)
-    at_nodes = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in of_blocks]
-    terms, directions = _polynomials(nodes_of_blocks), _polynomials(at_nodes)
+    normals_and_nodes = zip(np.split(normals, np.cumsum(side.sizes)[:-1]), nodes_of_blocks, strict=True)
+    normals_of_blocks = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in normals_and_nodes]
+    terms, directions = _polynomials(nodes_of_blocks), _polynomials(normals_of_blocks)
     parallel_map(
         lambda portion: projection_kernels.along_normals(
             *portion, relative_points, heights, terms, directions, side.triangular, side.neighbours, projection
@@ -359,7 +362,10 @@ def _polynomials(blocks: Sequence[Array]) -> Array:
 def along_line_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
-    """Project points (n, 2) onto a line along its interpolated normals; for the other parameters see `along_normals`."""
+    """Project points (n, 2) onto a line along its interpolated normals.
+
+    The other parameters and the results are those of `along_normals`, in 2D.
+    """
     nodes, at_nodes = coordinates[side.all_facets], normals
     if len(side.blocks) > 1:  # if some lines are curved, straight lines get a third node in the middle
         curved = side.node_weights[:, :, None] > 0.0
@@ -369,7 +375,7 @@ def along_line_normals(
     arguments = map(np.ascontiguousarray, (points, nodes, at_nodes))
     search_2d_kernels.along_normals(*arguments, neighbour, facet, xi, overhang)
     xi = xi[:, None]
-    return facet, xi, overhang, interpolate(normals[facet], places(side, facet, xi))
+    return facet, xi, overhang, interpolate(normals[facet], facet_points(side, facet, xi))
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:

@@ -8,9 +8,9 @@ in `search.facet_tables`; facets with fewer than m nodes have zeros at the end.
 import numpy as np
 
 from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS, STEP
+from fastcontact.contact.search.limits import LARGEST_OVERHANG, MAX_ITERATIONS, STEP
 from fastcontact.contact.search.projection_3d_kernels import component, vector
-from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, unit
+from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, plus_multiple, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
@@ -72,15 +72,18 @@ def _interpolated(terms, f, s, t):
 
 @innermost_kernel
 def _newton(point, terms, directions, f, s, t, height):
-    """Solve ``X(s, t) + height n(s, t) = point`` on the extended facet `f`; return (s, t) and whether it converged."""
+    """Return the solution (s, t) of ``X(s, t) + height n(s, t) = point`` on the extended facet `f`, and whether it converged.
+
+    X is the position and n the interpolated normal. The arguments (s, t) and `height` are the initial guess.
+    """
     for _ in range(MAX_ITERATIONS):
         foot, along_s, along_t = _interpolated(terms, f, s, t)
         normal, turn_s, turn_t = _interpolated(directions, f, s, t)
-        residual = minus(point, along(foot, normal, height))
-        p, q = along(along_s, turn_s, height), along(along_t, turn_t, height)
+        residual = minus(point, plus_multiple(foot, normal, height))
+        p, q = plus_multiple(along_s, turn_s, height), plus_multiple(along_t, turn_t, height)
         product = cross(q, normal)
         volume = dot(p, product)
-        # The columns of the Jacobian are linearly dependent if the volume they span is negligible.
+        # The columns of the Jacobian are linearly dependent if the volume that they span is negligible.
         if not abs(volume) > LENGTH_ROUND_OFF * np.sqrt(dot(p, p) * dot(q, q) * dot(normal, normal)):
             return s, t, False
         ds, dt = dot(residual, product) / volume, dot(residual, cross(normal, p)) / volume
@@ -94,7 +97,7 @@ def _newton(point, terms, directions, f, s, t, height):
 
 
 @innermost_kernel
-def beyond(triangle, s, t):
+def overhang_of(triangle, s, t):
     """Return how far reference coordinates lie outside a facet, in facet lengths; 0 inside."""
     outside = max(-s, -t, s + t - 1.0) if triangle else 0.5 * (max(abs(s), abs(t)) - 1.0)
     return max(outside, 0.0)
@@ -111,8 +114,8 @@ def clamped(triangle, s, t):
 
 
 @innermost_kernel
-def _rank(terms, triangle, f, s, t, length):
-    """Return the distance, relative to `length`, between facet `f` and a projection onto the extended facet.
+def _distance_beyond(terms, triangle, f, s, t, length):
+    """Return the distance, divided by `length`, between facet `f` and a projection (s, t) onto the extended facet.
 
     Neighbours are compared by this distance, because overhangs depend on the shapes of facets. If two facets are closest at a
     common node, a small fraction of the sum of all overhangs decides.
@@ -127,18 +130,21 @@ def _rank(terms, triangle, f, s, t, length):
 
 
 @innermost_kernel
-def _beside(point, terms, directions, triangular, neighbours, f, height, length):
-    """Return the neighbour of facet `f` with the smallest `_rank` of the projection, (s, t), and the rank, or infinity."""
+def _closest_neighbour(point, terms, directions, triangular, neighbours, f, height, length):
+    """Return the neighbour of facet `f` with the smallest `_distance_beyond`, (s, t) of the projection, and this distance.
+
+    The distance is infinite if no projection converges.
+    """
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
     for k in range(start[f], start[f + 1]):
         g = numbers[k]
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
-        rank = _rank(terms, triangular[g], g, s, t, length) if converged else np.inf
+        distance = _distance_beyond(terms, triangular[g], g, s, t, length) if converged else np.inf
         # If facets are equivalent, the first one is chosen.
-        if converged and max(rank, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
-            best, best_s, best_t, least = g, s, t, rank
+        if converged and max(distance, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
+            best, best_s, best_t, least = g, s, t, distance
     return best, best_s, best_t, least
 
 
@@ -150,14 +156,15 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
     ----------
     begin, end : int
     points : ndarray (n, 3)
-        [length].
+        Positions [length].
     heights : ndarray (n,)
         Heights of the points over their closest points [length].
     terms, directions : ndarray (n_facets, m, 3)
         Coefficients of positions [length] and of normals [-].
     triangular : ndarray of bool (n_facets,)
+        Whether each facet is a triangle.
     neighbours : (ndarray of int (n_facets + 1,), ndarray of int)
-        The facets that share a node with facet f, ascending, are numbers ``start[f]`` to ``start[f + 1] - 1``.
+        Offsets and numbers of the facets that share a node with each facet, see `Surface.neighbours`.
     projection : tuple of ndarray
         facet (n,), xi (n, 2) [-], overhang (n,) [-]: closest points, changed in place; and unit normals (n, 3), filled.
     """
@@ -166,17 +173,17 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
         point, f = (points[i, 0], points[i, 1], points[i, 2]), facet[i]
         s, t, over = xi[i, 0], xi[i, 1], overhang[i]
         a, b, converged = _newton(point, terms, directions, f, s, t, heights[i])
-        excess = beyond(triangular[f], a, b)
-        if converged and excess <= BEYOND:
-            s, t, over = a, b, excess
-            if excess > LENGTH_ROUND_OFF:
+        new_overhang = overhang_of(triangular[f], a, b)
+        if converged and new_overhang <= LARGEST_OVERHANG:
+            s, t, over = a, b, new_overhang
+            if new_overhang > LENGTH_ROUND_OFF:
                 edge = _interpolated(terms, f, s, t)[1]
                 length = np.sqrt(dot(edge, edge))
-                next_facet, a, b, rank = _beside(
+                next_facet, a, b, distance = _closest_neighbour(
                     point, terms, directions, triangular, neighbours, f, heights[i], length
                 )
-                if rank < _rank(terms, triangular[f], f, s, t, length):
-                    f, s, t, over = next_facet, a, b, beyond(triangular[next_facet], a, b)
+                if distance < _distance_beyond(terms, triangular[f], f, s, t, length):
+                    f, s, t, over = next_facet, a, b, overhang_of(triangular[next_facet], a, b)
         s, t = clamped(triangular[f], s, t)
         facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > LENGTH_ROUND_OFF else 0.0
         normal[i, 0], normal[i, 1], normal[i, 2] = unit(_interpolated(directions, f, s, t)[0])

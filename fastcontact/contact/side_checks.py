@@ -14,7 +14,7 @@ from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
 # Approximate number of sampled facets of each element type.
-SAMPLE = 200
+SAMPLE_SIZE = 200
 
 
 def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, excluded: Mask | None = None) -> None:
@@ -43,8 +43,8 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
     difference = other_centres[None] - centres[:, None]
     height, distance = np.einsum("ijd,id->ij", difference, normals), np.linalg.norm(difference, axis=2)
     facing = normals @ other_normals.T < 0
-    ahead = (height > -0.1 * distance) | (distance < np.minimum.outer(sizes, other_sizes))
-    if not (facing & ahead).any():
+    in_front = (height > -0.1 * distance) | (distance < np.minimum.outer(sizes, other_sizes))
+    if not (facing & in_front).any():
         depth = -height[facing]
         hint = f", or do the bodies overlap, by {depth.min():.4g} or more" if len(depth) else ""
         raise ContactError(
@@ -77,13 +77,13 @@ def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
         )
 
 
-def nodes_of_shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
+def nodes_of_shared_facets(mesh: Mesh, group: str, other_group: str) -> Numbers:
     """Return the sorted nodes of the facets that two groups share, even if the mesh contains a facet once for each group."""
-    facets_of_group, facets_of_other = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
+    facets_of_groups = [mesh.cells_of(name, dim=mesh.dim - 1) for name in (group, other_group)]
     nodes = [np.empty(0, np.int32)]
-    for name in facets_of_group.keys() & facets_of_other.keys():
+    for element in facets_of_groups[0].keys() & facets_of_groups[1].keys():
         facets, count = np.unique(
-            np.concatenate([np.unique(np.sort(side[name], axis=1), axis=0) for side in (facets_of_group, facets_of_other)]),
+            np.concatenate([np.unique(np.sort(by_type[element], axis=1), axis=0) for by_type in facets_of_groups]),
             axis=0, return_counts=True,
         )  # fmt: skip
         nodes.append(facets[count > 1].ravel())
@@ -91,9 +91,12 @@ def nodes_of_shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
 
 
 def _facet_geometry(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
-    """Return centres, unit normals and sizes of about SAMPLE facets of each element type, computed from their corners."""
+    """Return centres, unit normals and sizes of about SAMPLE_SIZE facets of each element type.
+
+    They are computed from the corners. Sizes are lengths in 2D, and square roots of areas in 3D [length].
+    """
     blocks = [(block.facets, elements.get(block.element).n_corners) for block in side.blocks]
-    corners = [mesh.points[facets[:: max(1, len(facets) // SAMPLE), :n]] for facets, n in blocks]
+    corners = [mesh.points[facets[:: max(1, len(facets) // SAMPLE_SIZE), :n]] for facets, n in blocks]
     centres = np.concatenate([block_corners.mean(axis=1) for block_corners in corners])
     normals = np.concatenate([flat_area_vectors(block_corners) for block_corners in corners])
     areas = np.linalg.norm(normals, axis=1)

@@ -71,12 +71,12 @@ class Surface:
 
     def with_periodic_ends(self, ends: Iterable[tuple[Indices, Indices, Array]]) -> Surface:
         """Return the surface with `periodic_ends`, given by point numbers; nodes that are not on the surface are ignored."""
-        order, on_surface = np.argsort(self.points), []
+        order, ends_on_surface = np.argsort(self.points), []
         for first, second, rotation in ends:
             valid = np.isin(first, self.points) & np.isin(second, self.points) & (first != second)
-            rows = (order[np.searchsorted(self.points, end[valid], sorter=order)] for end in (first, second))
-            on_surface.append((*rows, rotation))
-        return replace(self, periodic_ends=tuple(on_surface))
+            numbers = (order[np.searchsorted(self.points, end[valid], sorter=order)] for end in (first, second))
+            ends_on_surface.append((*numbers, rotation))
+        return replace(self, periodic_ends=tuple(ends_on_surface))
 
     def add_across_ends(self, vectors: Array) -> None:
         """Add up the vectors (m, dim) of corresponding nodes at both ends of each periodic interface, in place.
@@ -104,7 +104,10 @@ class Surface:
 
     @property
     def only_block(self) -> FacetBlock:
-        """The only block of facets; ContactError if there are several."""
+        """The only block of facets.
+
+        Raises ContactError if there are several.
+        """
         if len(self.blocks) > 1:
             raise ContactError(
                 f"group '{self.group}' mixes facets of {' and '.join(block.element for block in self.blocks)}, which this "
@@ -151,7 +154,7 @@ class Surface:
         return csr_array((np.ones(len(nodes)), nodes, start), shape=(self.n_facets, len(self.points)))
 
     @cached_property
-    def beside(self) -> csr_array:
+    def node_adjacency(self) -> csr_array:
         """Adjacency matrix (m, m) of the nodes: one if two nodes belong to the same facet, otherwise zero."""
         adjacency = csr_array(self.incidence.T @ self.incidence)
         adjacency.sort_indices()
@@ -159,9 +162,9 @@ class Surface:
         return adjacency
 
     @cached_property
-    def near(self) -> csr_array:
+    def extended_adjacency(self) -> csr_array:
         """Matrix (m, m), one if two nodes belong to the same facet or to two facets with a common node, otherwise zero."""
-        adjacency = csr_array(self.beside @ self.beside)
+        adjacency = csr_array(self.node_adjacency @ self.node_adjacency)
         adjacency.data[:] = 1.0
         return adjacency
 
@@ -231,7 +234,7 @@ def surface(mesh: Mesh, group: str) -> Surface:
     MeshError
         If there is no such group.
     ContactError
-        If the group contains no facets, or a facet inside a solid or without one.
+        If the group contains no facets, or a facet that lies inside a solid or does not belong to one.
     """
     cells = mesh.cells_of(group, dim=mesh.dim - 1)
     if not cells:

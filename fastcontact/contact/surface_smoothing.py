@@ -1,16 +1,17 @@
 r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that facets approximate.
 
-Non-matching facets of curved sides leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors of
-the order of :math:`E h / L` for facets of length L, independently of the interference. A surface of constant curvature and a
-polynomial of twice the order of the facet are fitted to the nodes of the facet and of those around it (local surface
-fitting: Jiao and Zha, 2008). The height of this smooth surface P above the facet is its interpolation error on the facet,
+Non-matching facets of curved sides leave gaps and overlaps of the size of their sag :math:`s`, and thus pressure errors of
+the order of :math:`E s / L` for facets of length L, independently of the interference. A surface of constant curvature plus a
+polynomial of twice the order of the facet is fitted to the nodes of the facet and of those around it (local surface fitting:
+Jiao and Zha, 2008). Let P be the height of this smooth surface above the plane of the facet. Its height h above the facet
+itself is the interpolation error of P with the shape functions :math:`N_a` of the nodes :math:`x_a`,
 :math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
 
 Only the curvature that both sides share is corrected: a sphere that is pressed on a plane is flat within the contact, like
 its facets. With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are
-multiplied by :math:`\min(\max(-K_s : K_p / K : K, 0), 1)`, with the tensor K of that side. Fits do not extend across
-corners. Where the curvature changes from one facet to the next, heights are multiplied by the limiter of van Albada, van
-Leer and Roberts (1982), :math:`2 K : K' / (K : K + K' : K')`, so that a plane beside a fillet stays plane.
+multiplied by :math:`\min(\max(-(K_s : K_p) / (K : K), 0), 1)`, with the tensor K of that side. Fits do not extend across
+corners. Where the curvature changes from K in one facet to K' in the next, heights are multiplied by the limiter of van
+Albada, van Leer and Roberts (1982), :math:`2 K : K' / (K : K + K' : K')`, so that a plane next to a fillet remains plane.
 """
 
 from __future__ import annotations
@@ -23,16 +24,17 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import CORNER, closest_of_kinds
+from fastcontact.contact.projection import CORNER, closest_of_types
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Factor by which the columns of a least-squares fit decrease with each degree of the polynomial. Because the fit is damped,
-# it prefers terms of low degree if the nodes do not determine all terms, as on a strip of a single row of facets.
+# Factor by which the columns of a least-squares fit decrease with each degree of the polynomial. As the fit is regularised,
+# it prefers terms of low degree if the nodes do not determine all terms, such as on a strip of a single row of facets.
 DEGREE_FACTOR = 0.1
-# Number of passes of a fit. The relative error for circles, spheres and cylinders is of the order (L / R)^(2 PASSES).
+# Number of passes of a fit. The relative error for circles, spheres and cylinders of radius R is of the order
+# (L / R)^(2 PASSES).
 PASSES = 3
 
 
@@ -83,32 +85,33 @@ class Smoothing:
             return None
         smoothing = cls(smooth_secondary, smooth_primary)
         axes = [frames(side, points, points) for side in (secondary, primary)]
-        middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
-        opposite = closest_of_kinds(np.concatenate(middles), primary.node_positions(points)).facet
-        factor = smoothing.shared(np.arange(len(opposite)), opposite, axes)
+        centres = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
+        opposite = closest_of_types(np.concatenate(centres), primary.node_positions(points)).facet
+        factor = smoothing.height_factors(np.arange(len(opposite)), opposite, axes)
         is_corrected = factor[:, 0] * np.abs(smooth_secondary.heights).max(axis=(1, 2)) > 0.0
         is_corrected |= factor[:, 1] * np.abs(smooth_primary.heights[opposite]).max(axis=(1, 2)) > 0.0
         return smoothing if is_corrected.any() else None
 
-    def shared(self, secondary: Indices, primary: Indices, frames: Sequence[Array]) -> Array:
-        """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other.
+    def height_factors(self, secondary: Indices, primary: Indices, frames: Sequence[Array]) -> Array:
+        """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other [-].
 
-        `frames` are the current tangents of all facets, see the function `frames`.
+        `frames` are the current tangents of all facets of both sides, see the function `frames`.
         """
-        a = self.secondary.curvature[secondary]
-        b = _in_plane_of(frames[0][secondary], frames[1][primary], self.primary.curvature[primary])
-        common = -np.einsum("nij,nij->n", a, b)
-        squares = np.stack([np.einsum("nij,nij->n", tensor, tensor) for tensor in (a, b)], axis=1)
-        return np.clip(np.divide(common[:, None], squares, out=np.zeros_like(squares), where=squares > 0.0), 0.0, 1.0)
+        K_s = self.secondary.curvature[secondary]
+        K_p = _in_plane_of(frames[0][secondary], frames[1][primary], self.primary.curvature[primary])
+        product = -np.einsum("nij,nij->n", K_s, K_p)
+        squares = np.stack([np.einsum("nij,nij->n", K, K) for K in (K_s, K_p)], axis=1)
+        return np.clip(np.divide(product[:, None], squares, out=np.zeros_like(squares), where=squares > 0.0), 0.0, 1.0)
 
     def overlap(
         self, secondary: tuple[Indices, Array], primary: tuple[Indices, Array], frames: Sequence[Array]
     ) -> Array:
         """Return the distances (n,) by which the smooth surfaces are closer to each other than the facing facets [length].
 
-        `secondary` and `primary` are facets (n,) and reference coordinates (n, dim - 1) in them.
+        `secondary` and `primary` are facets (n,) and reference coordinates (n, dim - 1) in them. For `frames`, see
+        `height_factors`.
         """
-        factor = self.shared(secondary[0], primary[0], frames)
+        factor = self.height_factors(secondary[0], primary[0], frames)
         return factor[:, 0] * self.secondary.at(*secondary) + factor[:, 1] * self.primary.at(*primary)
 
 
@@ -136,7 +139,10 @@ def _normals(block: FacetBlock, coordinates: Array) -> Array:
 
 
 def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
-    """Return tangents and normal (n_facets, dim, dim) in the middle of facets, from that `normal` (n_facets, dim)."""
+    """Return the unit tangents and normal (n_facets, dim, dim) at the centres of facets with this `normal` (n_facets, dim).
+
+    The first tangent points to the first corner. `coordinates` (n_points, dim) are those of all points [length].
+    """
     corners = coordinates[block.facets[:, : elements.get(block.element).n_corners]]
     first = corners[:, 0] - corners.mean(axis=1)
     first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
@@ -147,51 +153,56 @@ def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
 def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     """Return the smooth surface of a side at `points` (n_points, dim); None if its facets have no sag."""
     offset = points[side.points] - points[side.points].mean(axis=0)
-    if np.linalg.svd(offset, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(offset):  # in one plane
+    # All nodes are in one plane.
+    if np.linalg.svd(offset, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(offset):
         return None
-    near, nodes, valid = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
+    adjacency, nodes, valid = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
     neighbourhood, start, fits = points[side.points[nodes]], 0, []
-    offset, inside = np.where(valid[:, :, None], neighbourhood, 0.0), valid[:, :, None]
-    offset = np.where(inside, offset - (offset.sum(axis=1) / valid.sum(axis=1)[:, None])[:, None], 0.0)
-    least = np.linalg.eigvalsh(offset.transpose(0, 2, 1) @ offset)[:, 0]
-    if (least <= (LENGTH_ROUND_OFF * np.linalg.norm(offset, axis=(1, 2))) ** 2).all():  # around each facet
+    offset, is_valid = np.where(valid[:, :, None], neighbourhood, 0.0), valid[:, :, None]
+    offset = np.where(is_valid, offset - (offset.sum(axis=1) / valid.sum(axis=1)[:, None])[:, None], 0.0)
+    smallest = np.linalg.eigvalsh(offset.transpose(0, 2, 1) @ offset)[:, 0]
+    # The nodes around each facet are in one plane.
+    if (smallest <= (LENGTH_ROUND_OFF * np.linalg.norm(offset, axis=(1, 2))) ** 2).all():
         return None
     for block in side.blocks:
         rows = slice(start, start + len(block.facets))
         fit = _fit(block, points, neighbourhood[rows], valid[rows], 2 * side.order)
-        extends = fit.extends_to(neighbourhood[rows], valid[rows])
+        is_determined = fit.extends_to(neighbourhood[rows], valid[rows])[:, None, None]
         heights, curvature, axes = _heights(block, points, fit, fit.error(neighbourhood[rows], valid[rows]))
-        fits.append((heights * extends[:, None, None], curvature * extends[:, None, None], axes))
+        fits.append((heights * is_determined, curvature * is_determined, axes))
         start += len(block.facets)
-    heights, curvature, axes = (np.concatenate(of_blocks) for of_blocks in zip(*fits, strict=True))
+    heights, curvature, axes = map(np.concatenate, zip(*fits, strict=True))
     if not heights.any():
         return None
-    return SmoothSide(heights * _limiter(near, curvature, axes)[:, None, None], curvature)
+    return SmoothSide(heights * _limiter(adjacency, curvature, axes)[:, None, None], curvature)
 
 
 def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:
     """Return the smooth neighbours of each facet, which share a node with it without a corner, and the nodes of these facets.
 
     The results are an adjacency matrix (n_facets, n_facets) with ones on the diagonal, the nodes (n_facets, k) as positions
-    in the points of the side, and a mask of the valid entries of the second array.
+    in the points of the side, and a mask of the valid entries of the second array. `normal` (n_facets, dim) are the normals
+    of the facets.
     """
-    incidence = side.incidence.sorted_indices()  # with the order of nodes, round-off would depend on that of each facet
+    # Without sorting, round-off would depend on the order of the nodes in each facet.
+    incidence = side.incidence.sorted_indices()
     i, j = (incidence @ incidence.T).tocoo().coords
     smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER))
-    near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
-    neighbour_nodes = csr_array(near @ incidence)
+    adjacency = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
+    neighbour_nodes = csr_array(adjacency @ incidence)
     valid = np.arange(np.diff(neighbour_nodes.indptr).max()) < np.diff(neighbour_nodes.indptr)[:, None]
     nodes = np.zeros(valid.shape, np.intp)
     nodes[valid] = neighbour_nodes.indices
-    return near, nodes, valid
+    return adjacency, nodes, valid
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
     """Smooth surfaces above the planes of n facets, the sum of a surface of constant `curvature` (n, d, d) and a polynomial.
 
-    The planes contain the mean of the corners, `origin`, and have the `axes` (n, dim, dim), the last of which are normals.
-    `polynomial` (n, n_terms) are the coefficients. Lengths are relative to the `size` (n,) of the facets.
+    The planes contain the mean of the corners, `origin` (n, dim), and have the `axes` (n, dim, dim), the last of which are
+    normals. `polynomial` (n, n_terms) are the coefficients of the terms with the exponents `powers`. Lengths are relative to
+    the `size` (n,) of the facets; d is dim - 1.
     """
 
     axes: Array
@@ -209,36 +220,37 @@ class _Fit:
     def fitted(self, points: Array, valid: Mask) -> _Fit:
         """Return the surfaces with polynomials fitted to those `points` (n, m, dim) that are `valid` (n, m)."""
         (plane, height), (i, j) = self.in_planes(points), self.powers
-        powers = [math.comb(*pair) for pair in zip(i + j, i)]
-        scale = DEGREE_FACTOR ** (i + j) * np.sqrt(powers)  # Bombieri's norm is invariant under rotation
+        binomials = [math.comb(*pair) for pair in zip(i + j, i)]
+        scale = DEGREE_FACTOR ** (i + j) * np.sqrt(binomials)  # Bombieri's norm is invariant under rotation
         columns = np.where(valid[..., None], scale * _terms(plane, i, j), 0.0)
         residual = np.where(valid, height - _conic(self.curvature, plane), 0.0)
-        size = DEGREE_FACTOR ** (i + j).max() * np.sqrt(SINGLE_PRECISION * (columns**2).sum(axis=(1, 2)))
-        damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
-        # With normal equations instead of QR, terms determined by the damping would be accurate to only 1e-3.
-        rows = np.concatenate([np.concatenate([columns, residual[..., None]], axis=2), damping], axis=1)
+        parameter = DEGREE_FACTOR ** (i + j).max() * np.sqrt(SINGLE_PRECISION * (columns**2).sum(axis=(1, 2)))
+        regularisation = parameter[:, None, None] * np.eye(len(i), len(i) + 1)
+        # With normal equations instead of QR, terms determined by the regularisation would be accurate to only 1e-3.
+        rows = np.concatenate([np.concatenate([columns, residual[..., None]], axis=2), regularisation], axis=1)
         R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
         return replace(self, polynomial=scale * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
 
     def at(self, plane: Array) -> Array:
-        """Return the heights (n, m) over points (n, m, d) of the planes."""
+        """Return the heights (n, m) above points (n, m, d) of the planes."""
         return _conic(self.curvature, plane) + np.einsum("nqt,nt->nq", _terms(plane, *self.powers), self.polynomial)
 
     def extends_to(self, points: Array, valid: Mask) -> Mask:
         """Return which surfaces (n,) of constant curvature extend to all `points` (n, m, dim) that are `valid` (n, m).
 
-        The nodes do not determine other surfaces, for example those of three coarse facets in a row, which amplify round-off.
+        If the points lie outside the surface of constant curvature, for example in three coarse facets in a row, they do not
+        determine the surface, and the fit amplifies round-off.
         """
-        bent = np.einsum("nqd,nde->nqe", self.in_planes(points)[0], self.curvature)
-        return np.asarray((((bent**2).sum(axis=2) < 1.0) | ~valid).all(axis=1))
+        Kx = np.einsum("nqd,nde->nqe", self.in_planes(points)[0], self.curvature)
+        return np.asarray((((Kx**2).sum(axis=2) < 1.0) | ~valid).all(axis=1))
 
     def error(self, points: Array, valid: Mask) -> Array:
         """Return the largest distances (n,) from the surfaces to those `points` (n, m, dim) that are `valid` (n, m)."""
         plane, height = self.in_planes(points)
         return np.asarray(np.where(valid, np.abs(self.at(plane) - height), 0.0).max(axis=1))
 
-    def at_middle(self) -> tuple[Array, Array]:
-        """Return slopes (n, d) and curvatures (n, d, d) in the middle of the facets."""
+    def slope_and_curvature(self) -> tuple[Array, Array]:
+        """Return the slopes (n, d) and curvatures (n, d, d) at the centres of the facets."""
         term = {(int(a), int(b)): n for n, (a, b) in enumerate(zip(*self.powers, strict=True))}
         if self.curvature.shape[1] == 1:
             slope, second = [term[1, 0]], np.array([[term[2, 0]]])
@@ -247,8 +259,8 @@ class _Fit:
         return self.polynomial[:, slope], self.curvature - self.polynomial[:, second] * (1.0 + np.eye(len(second)))
 
 
-def _fit(block: FacetBlock, points: Array, around: Array, valid: Mask, degree: int) -> _Fit:
-    """Fit surfaces to the points `around` (n, m, dim) the facets of a block, of which only the `valid` ones (n, m) are used.
+def _fit(block: FacetBlock, points: Array, neighbourhood: Array, valid: Mask, degree: int) -> _Fit:
+    """Fit surfaces to the `valid` (n, m) points of the `neighbourhood` (n, m, dim) of each facet of a block [length].
 
     In each pass, planes are rotated to the tangents of the surfaces, and the curvatures of the polynomials are moved to
     `curvature`.
@@ -258,10 +270,10 @@ def _fit(block: FacetBlock, points: Array, around: Array, valid: Mask, degree: i
     size = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
     powers = _powers(points.shape[1] - 1, degree)
     curvature = np.zeros((len(corners), *2 * (points.shape[1] - 1,)))
-    fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(around, valid)
+    fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(neighbourhood, valid)
     for _ in range(1, PASSES):
-        slope, curvature = fit.at_middle()
-        fit = replace(fit, axes=_tilted(fit.axes, slope), curvature=curvature).fitted(around, valid)
+        slope, curvature = fit.slope_and_curvature()
+        fit = replace(fit, axes=_tilted(fit.axes, slope), curvature=curvature).fitted(neighbourhood, valid)
     return fit
 
 
@@ -275,19 +287,20 @@ def _tilted(axes: Array, slope: Array) -> Array:
 
 
 def _heights(block: FacetBlock, points: Array, smooth: _Fit, error: Array) -> tuple[Array, Array, Array]:
-    """Return coefficients (n, k, m) of the heights of surfaces above facets, their curvatures and tangents in the middle.
+    """Return the coefficients (n, k, m) of the heights of surfaces above facets, and their curvatures and tangents.
 
-    Heights of surfaces with an `error` (n,) of more than the largest height are zero: no smooth surface fits these nodes.
+    Curvatures and tangents are those at the centres of the facets. If the `error` (n,) of a fit is larger than the largest
+    height, no smooth surface fits the nodes, and the heights are zero.
     """
     element, k = elements.get(block.element), smooth.powers[0].max() + 1
     (xi, powers), (corners, _) = _lattice(element, k), smooth.in_planes(points[block.facets])
     shape = element.shape(xi)
     height = smooth.at(np.einsum("qk,nke->nqe", shape, corners)) - smooth.at(corners) @ shape.T
-    least = np.where(error > np.abs(height).max(axis=1), np.inf, LENGTH_ROUND_OFF)
-    height = smooth.size[:, None] * np.where(np.abs(height) > least[:, None], height, 0.0)
+    threshold = np.where(error > np.abs(height).max(axis=1), np.inf, LENGTH_ROUND_OFF)
+    height = smooth.size[:, None] * np.where(np.abs(height) > threshold[:, None], height, 0.0)
     heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
     heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
-    curvature = smooth.at_middle()[1]
+    curvature = smooth.slope_and_curvature()[1]
     curvature = np.where(np.abs(curvature) > LENGTH_ROUND_OFF, curvature, 0.0) / smooth.size[:, None, None]
     return heights, curvature, smooth.axes[:, :-1]
 
@@ -295,11 +308,11 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit, error: Array) -> tu
 def _conic(curvature: Array, plane: Array) -> Array:
     r"""Return the heights (n, m) of surfaces of constant `curvature` K (n, d, d) over points x (n, m, d) of their planes.
 
-    :math:`-x^T K x / (1 + \sqrt{1 - x^T K^2 x})`, which is exact for spheres and cylinders.
+    They are :math:`-x^T K x / (1 + \sqrt{1 - x^T K^2 x})`, which is exact for spheres and cylinders.
     """
-    bent = np.einsum("nqd,nde->nqe", plane, curvature)
-    root = np.sqrt(np.maximum(1.0 - (bent**2).sum(axis=2), 0.0))
-    return np.asarray(-(bent * plane).sum(axis=2) / (1.0 + root))
+    Kx = np.einsum("nqd,nde->nqe", plane, curvature)
+    root = np.sqrt(np.maximum(1.0 - (Kx**2).sum(axis=2), 0.0))
+    return np.asarray(-(Kx * plane).sum(axis=2) / (1.0 + root))
 
 
 def _powers(dim: int, degree: int) -> tuple[Indices, Indices]:
@@ -328,13 +341,17 @@ def _lattice(element: elements.Element, k: int) -> tuple[Array, tuple[Indices, I
     return (abscissa[i][:, None] if element.dim == 1 else np.column_stack([abscissa[i], abscissa[j]])), (i, j)
 
 
-def _limiter(near: csr_array, curvature: Array, axes: Array) -> Array:
-    """Return the factors (n_facets,) that reduce heights where the curvature changes towards `near` facets."""
-    i, j = near.tocoo().coords
+def _limiter(adjacency: csr_array, curvature: Array, axes: Array) -> Array:
+    """Return the factors (n_facets,) that reduce heights where the curvature changes towards adjacent facets [-].
+
+    `adjacency` (n_facets, n_facets) is the first result of `_neighbours`. The tensors `curvature` (n_facets, d, d) have
+    components along `axes` (n_facets, d, dim).
+    """
+    i, j = adjacency.tocoo().coords
     neighbour, square = _in_plane_of(axes[i], axes[j], curvature[j]), np.einsum("nij,nij->n", curvature, curvature)
-    common, squares = 2.0 * np.einsum("nij,nij->n", curvature[i], neighbour), square[i] + square[j]
+    product, squares = 2.0 * np.einsum("nij,nij->n", curvature[i], neighbour), square[i] + square[j]
     factor = np.ones(len(curvature))
-    np.minimum.at(factor, i, np.divide(common, squares, out=np.ones_like(squares), where=squares > 0.0))
+    np.minimum.at(factor, i, np.divide(product, squares, out=np.ones_like(squares), where=squares > 0.0))
     return np.maximum(factor, 0.0)
 
 

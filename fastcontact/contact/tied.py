@@ -7,7 +7,7 @@ multiplier field, as in the mortar method (Bernardi, Maday and Patera, 1994), so
 influence.
 
 If supports hold both sides at a node, the secondary side has fewer free displacements than multipliers. The multipliers are
-then not determined, because multipliers that alternate from node to node and decay along the surface do no work. Their number
+then not unique, because multipliers that alternate from node to node and decay along the surface do no work. Their number
 is reduced as at the ends of mortar lines (Bernardi et al., section 3): in a direction that is held on both sides, the
 multiplier of a node is the mean of those of its neighbours, so that uniform tractions remain possible (`reduction`).
 
@@ -28,7 +28,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Pairing, normals
-from fastcontact.contact.projection import facets_containing, places
+from fastcontact.contact.projection import facet_points, facets_containing
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.linear.sparse_rows import nodal_rows
@@ -42,15 +42,15 @@ class TiedPair:
     Attributes
     ----------
     moments : csr_array (q, m)
-        Matrix from the gaps at the m constraint points of the formulation to the q gaps that vanish.
+        Matrix from the gaps at the m constraint points of the formulation to the q weighted gaps of the equations [-].
     rows : tuple of csr_array (q, n_dofs)
-        Relative displacements along the normal and each tangent.
+        Matrices from the displacements to the relative displacements along the normal and each tangent [-].
     directions : tuple of ndarray (m, dim)
         Tangents [-].
     positions : ndarray (q, dim)
         Approximate positions of the equations on the reference surface [length].
     nodal : NodalField
-        Nodal interpretation of the forces at the constraint points.
+        Map from the forces at the constraint points to nodal pressures.
     nodes : ndarray of int (q,), optional
         Secondary nodes of the gaps, see `Constraints`.
     areas : ndarray (q,), optional
@@ -75,11 +75,14 @@ class TiedPair:
         n = B.shape[0]
         positions = np.tile(self.positions, (len(self.rows), 1))
         nodes = None if self.nodes is None else np.tile(self.nodes, len(self.rows))
-        always = np.ones(n, bool)
-        return Constraints(B, np.zeros(n), positions, equality=always, nodes=nodes, nodal=self.nodal, tied=self)
+        equality = np.ones(n, bool)
+        return Constraints(B, np.zeros(n), positions, equality=equality, nodes=nodes, nodal=self.nodal, tied=self)
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
-        """Return normal (m,) and tangential (m, k) forces at the constraint points of the formulation."""
+        """Return normal (m,) and tangential (m, k) forces at the constraint points of the formulation [force].
+
+        `multiplier` (q dim,) are the multipliers of the equations [force].
+        """
         multiplier = multiplier if self.reduction is None else self.reduction @ multiplier
         components = [self.moments.T @ component for component in multiplier.reshape(len(self.rows), -1)]
         return components[0], np.column_stack(components[1:])
@@ -89,39 +92,44 @@ def tied_pair(
     constraints: Constraints, moments: csr_array, areas: Array | None, reduction: csr_array | None
 ) -> TiedPair:
     """Return the equations of a tied pair, given `constraints` with tangents; see `moments_of` and `TiedPair`."""
-    size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY)
-    positions = abs(moments) @ constraints.positions / size[:, None]
+    weights = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY)
+    positions = abs(moments) @ constraints.positions / weights[:, None]
     rows = [csr_array(moments @ row) for row in (constraints.B, *constraints.tangents)]
     if reduction is not None:
-        reduced_rows, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(size)
+        reduced_rows, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(weights)
         rows = [csr_array(reduced_rows[first : first + q]) for first in range(0, reduced_rows.shape[0], q)]
     assert constraints.nodal is not None
     return TiedPair(
-        moments, tuple(map(_cleaned, rows)), constraints.directions, positions, constraints.nodal, constraints.nodes, areas,
-        reduction,
+        moments, tuple(map(_without_round_off, rows)), constraints.directions, positions, constraints.nodal,
+        constraints.nodes, areas, reduction,
     )  # fmt: skip
 
 
 def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
-    """Return the basis functions of the multipliers as rows (q, m), and their integrals (q,) if known [area]."""
+    """Return the test functions of the equations as rows (q, m), and their integrals (q,) if known [area].
+
+    For a multiplier field with integration points, the rows contain the weights of the points, which sum to one if they are
+    positive. An integration point on the axis, which has no area, has a row of its own.
+    """
     if not isinstance(constraints.compliance, Projection):
         return csr_array(eye_array(len(constraints.gap0), format="csr")), constraints.areas
     P, areas = constraints.compliance.P, constraints.compliance.areas
     weighted_P = csr_array(P.T @ diags_array(areas))
     scale = np.asarray(abs(weighted_P).sum(axis=1)).ravel()
     on_axis = np.flatnonzero((areas == 0.0) & constraints.usable)
-    single = csr_array((np.ones(len(on_axis)), (np.arange(len(on_axis)), on_axis)), shape=(len(on_axis), len(areas)))
-    scales = np.concatenate([scale, np.zeros(len(on_axis))])
-    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted_P, single])), scales
+    axis_rows = csr_array((np.ones(len(on_axis)), (np.arange(len(on_axis)), on_axis)), shape=(len(on_axis), len(areas)))
+    integrals = np.concatenate([scale, np.zeros(len(on_axis))])
+    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted_P, axis_rows])), integrals
 
 
-def _cleaned(rows: csr_array) -> csr_array:
+def _without_round_off(rows: csr_array) -> csr_array:
+    """Remove the entries of a matrix that are zero up to round-off, in place, and return the matrix."""
     rows.data[np.abs(rows.data) < ROUND_OFF * np.abs(rows.data).max(initial=0.0)] = 0.0
     rows.eliminate_zeros()
     return rows
 
 
-def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: csr_array) -> csr_array:
+def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, adjacency: csr_array) -> csr_array:
     """Return the matrix (q dim, q dim) that maps the remaining multipliers to all multipliers.
 
     The columns of removed multipliers are empty. Multipliers are forces: first the normal components of all nodes, then the
@@ -132,13 +140,13 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     frames : ndarray (q, dim, dim)
         Unit vectors along which the equations of each node are formulated, first the normal and then the tangents [-].
     held : ndarray (q, dim, dim)
-        Projectors on the directions in which supports hold both sides [-].
+        Projectors onto the directions in which supports hold both sides [-].
     nodes : ndarray of int (q,)
         Secondary nodes of the equations.
     areas : ndarray (q,)
         Integrals of their test functions, zero for empty equations [area].
-    beside : csr_array (n_nodes, n_nodes)
-        Adjacency of nodes with a common facet.
+    adjacency : csr_array (n_nodes, n_nodes)
+        Adjacency matrix of the nodes, see `Surface.node_adjacency`.
     """
     q, dim = held.shape[:2]
     n_held = np.trace(held, axis1=1, axis2=2).round().astype(np.intp)
@@ -146,18 +154,17 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     held_part = np.linalg.norm(np.einsum("qde,qke->qkd", held, frames), axis=2)
     is_free = np.argsort(np.argsort(-held_part, axis=1, kind="stable"), axis=1) >= n_held[:, None]
     free_part = np.where(is_free[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
-    around = coo_array(csr_array(beside[nodes])[:, nodes][held_nodes])
-    is_pair = (areas[around.col] > 0.0) & (areas[held_nodes[around.row]] > 0.0) & (held_nodes[around.row] != around.col)
-    receiver, giver = around.row[is_pair], around.col[is_pair]
+    pairs = coo_array(csr_array(adjacency[nodes])[:, nodes][held_nodes])
+    is_valid = (areas[pairs.col] > 0.0) & (areas[held_nodes[pairs.row]] > 0.0) & (held_nodes[pairs.row] != pairs.col)
+    held_index, neighbour = pairs.row[is_valid], pairs.col[is_valid]
     total = np.zeros((len(held_nodes), dim, dim))
-    np.add.at(total, receiver, free[giver])
-    share = held[held_nodes] @ np.linalg.pinv(total, hermitian=True)
-    rows, columns = np.append(np.arange(q), held_nodes[receiver]), np.append(np.arange(q), giver)
-    size = np.where(areas > 0.0, areas, 1.0)
-    tractions = (
-        np.concatenate([free_part, share[receiver] @ free_part[giver]]) * (size[rows] / size[columns])[:, None, None]
-    )
-    blocks = frames[rows] @ tractions
+    np.add.at(total, held_index, free[neighbour])
+    mean = held[held_nodes] @ np.linalg.pinv(total, hermitian=True)
+    rows, columns = np.append(np.arange(q), held_nodes[held_index]), np.append(np.arange(q), neighbour)
+    # The means are those of tractions, and multipliers are forces.
+    weights = np.where(areas > 0.0, areas, 1.0)
+    ratio = (weights[rows] / weights[columns])[:, None, None]
+    blocks = frames[rows] @ (np.concatenate([free_part, mean[held_index] @ free_part[neighbour]]) * ratio)
     blocks[np.abs(blocks) < ROUND_OFF] = 0.0
     row, column = (np.arange(dim) * q + node[:, None] for node in (rows, columns))
     row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
@@ -182,22 +189,24 @@ def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface
     size = float(np.ptp(constraints.positions, axis=0).max(initial=0.0))
     # At an edge the derivative is the mean over the facets that meet there, as the facet of the pairing depends on round-off.
     point, facet, xi = facets_containing(primary, pairing.facet, pairing.xi)
-    normal, feet = normals(constraints.directions)[point], places(primary, facet, xi)
+    normal, feet = normals(constraints.directions)[point], facet_points(primary, facet, xi)
     base_vectors = np.einsum("pkj,pkd->pdj", feet.gradient, points[feet.nodes])
     gradient = np.einsum("pkj,pjd->pkd", feet.gradient, np.linalg.pinv(base_vectors))
-    share = 1.0 / np.bincount(point)
-    mean = csr_array((share[point], (point, np.arange(len(point)))))
+    weight = 1.0 / np.bincount(point)
+    mean = csr_array((weight[point], (point, np.arange(len(point)))))
     slopes = [np.einsum("pkd,pd->pk", gradient, direction[point]) for direction in constraints.directions]
-    levers = [mean @ nodal_rows(feet.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
+    entries = [slope[:, :, None] * normal[:, None, :] for slope in slopes]
+    derivatives = [mean @ nodal_rows(feet.nodes, values, points.size) for values in entries]
     translations, rotations = np.split(rigid_modes(points, "3d"), [points.shape[1]], axis=1)
-    arms = np.stack([lever @ rotations for lever in levers], axis=1)
+    tilts = np.stack([derivative @ rotations for derivative in derivatives], axis=1)
     spurious = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
     translation = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
-    # Lengths of arms form a tensor. One length per tangent would depend on the choice of tangents if the gap is not normal.
-    lengths = spurious @ np.linalg.pinv(arms)
+    # The lengths of the arms form a tensor. With one length per tangent, the result would depend on the choice of the
+    # tangents if the vector across the gap is not normal to the surface.
+    lengths = spurious @ np.linalg.pinv(tilts)
     lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (translation > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
     tangents = [
-        csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ lever for j, lever in enumerate(levers)))
+        csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ rows for j, rows in enumerate(derivatives)))
         for k, tangent in enumerate(constraints.tangents)
     ]
     return replace(constraints, tangents=tuple(tangents) if lengths.any() else constraints.tangents)

@@ -15,7 +15,7 @@ from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.materials import Constant, Material, check_positive
-from fastcontact.elasticity.varying_constants import CellAxes, Varying, wrapped
+from fastcontact.elasticity.varying_constants import CellAxes, Varying, wrap_varying
 from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
 
@@ -257,12 +257,12 @@ class Anisotropic(Material):
 
 def _set_other_properties(material: Orthotropic | Anisotropic) -> None:
     """Check and normalise the axes and the properties that do not determine the moduli."""
-    object.__setattr__(material, "density", wrapped(material.density))
+    object.__setattr__(material, "density", wrap_varying(material.density))
     for name in ("expansion", "conductivity"):
         value = getattr(material, name)
         if isinstance(value, np.ndarray) and value.shape == (3,):  # one constant along each axis
             value = tuple(value.tolist())
-        object.__setattr__(material, name, wrapped(value, vector=True))
+        object.__setattr__(material, name, wrap_varying(value, vector=True))
     object.__setattr__(material, "axes", _axes(material.axes))
     material.check_thermal_and_density(3)
     for name in ("expansion", "conductivity"):
@@ -283,7 +283,7 @@ def _axes(axes: Any) -> Any:
 def _three_constants(name: str, values: Any) -> tuple[Any, Any, Any]:
     """Return the three constants E, nu or G of an orthotropic material; raise ModelError unless they are valid."""
     try:
-        a, b, c = (v if isinstance(v, Varying) else _real(v) for v in map(wrapped, values))
+        a, b, c = (v if isinstance(v, Varying) else _real(v) for v in map(wrap_varying, values))
     except (TypeError, ValueError):
         order = "1, 2 and 3" if name == "E" else "12, 13 and 23"
         raise ModelError(f"{name} = {values!r} of an orthotropic material must be three numbers, for {order}") from None

@@ -15,13 +15,13 @@ from fastcontact.elasticity.constitutive_kernels import (
     INVARIANTS,
     cofactor,
     determinant,
+    evaluate_law,
     first_invariant,
-    respond,
     sum_products,
     voigt,
 )
 from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
-from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
+from fastcontact.elasticity.element_2d_kernels import TWO_PI, find_owned
 from fastcontact.elasticity.element_3d_kernels import add_block
 from fastcontact.elasticity.tile_product import tile
 from fastcontact.mesh.jacobian_kernels import cofactors
@@ -61,12 +61,12 @@ def _map(points, displacement, cells, c, columns, x, maps):
 
 
 @kernel
-def _at_point(maps, q, dim, rows, finite, inverse, gradient, F):
+def _deformation_gradient(maps, q, dim, rows, finite, inverse, gradient, F):
     """Fill F (3, 3) and the three rows of point q in `gradient` (n_q * 3 + 1, width); return det J.
 
     `maps` is computed by `_map`, and `rows` by `_tables`. `inverse` (3, 4) is overwritten.
     """
-    k, one = 3 * q, 1.0 if finite else 0.0
+    k, identity = 3 * q, 1.0 if finite else 0.0
     j00, j01, j02, j10, j11, j12 = maps[k, 0], maps[k, 1], maps[k, 2], maps[k + 1, 0], maps[k + 1, 1], maps[k + 1, 2]
     j20, j21, j22 = maps[k + 2, 0], maps[k + 2, 1], 1.0 if dim == 2 else maps[k + 2, 2]
     c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
@@ -80,12 +80,12 @@ def _at_point(maps, q, dim, rows, finite, inverse, gradient, F):
     for i in range(3):
         r, s, t = maps[k, 4 + i], maps[k + 1, 4 + i], maps[k + 2, 4 + i]
         for j in range(3):
-            F[i, j] = r * inverse[0, j] + s * inverse[1, j] + t * inverse[2, j] + (one if i == j else 0.0)
+            F[i, j] = r * inverse[0, j] + s * inverse[1, j] + t * inverse[2, j] + (identity if i == j else 0.0)
     return det
 
 
 @kernel
-def _about_axis(x, N, q, gradient, F):
+def _add_hoop_terms(x, N, q, gradient, F):
     """Fill the third row of `gradient` of point q with N / r, add the hoop strain to F, and return 2 pi r."""
     radius = hoop = 0.0
     for a in range(len(x)):
@@ -98,19 +98,19 @@ def _about_axis(x, N, q, gradient, F):
 
 
 @kernel
-def _expanded(strain, N, cell, rise, finite, F, gradient):
+def _remove_expansion(strain, N, cell, rise, finite, F, gradient):
     """Remove thermal expansion from F and from the shape derivatives `gradient` (3, width), in place.
 
     `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per unit rise, with engineering shear
     strains. Returns the thermal volume ratio and the thermal strain along z.
     """
-    rise_at_point, one = 0.0, 1.0 if finite else 0.0
+    rise_at_point, identity = 0.0, 1.0 if finite else 0.0
     for a in range(len(cell)):
         rise_at_point += N[a] * rise[cell[a]]
     U, inverse = np.empty((3, 3)), np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            U[i, j] = one + rise_at_point * strain[i] if i == j else 0.5 * rise_at_point * strain[voigt(i, j)]
+            U[i, j] = identity + rise_at_point * strain[i] if i == j else 0.5 * rise_at_point * strain[voigt(i, j)]
     if not finite:
         F -= U
         return 1.0, U[2, 2]
@@ -157,7 +157,7 @@ def _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A):
 
 
 @kernel
-def _respond_in_plane_stress(constants, D, bulk, finite, strain_z, F, old, new, P, A, G):
+def _solve_plane_stress(constants, D, bulk, finite, strain_z, F, old, new, P, A, G):
     """Solve for the value of F_zz at which P_zz vanishes, and eliminate F_zz from A.
 
     `strain_z` is the thermal strain along z. Returns the energy density, and whether the iteration has converged.
@@ -168,7 +168,7 @@ def _respond_in_plane_stress(constants, D, bulk, finite, strain_z, F, old, new, 
         dilatation = _dilatation(F, finite, G)
         pressure = bulk * dilatation
         volumetric = (pressure, bulk, pressure if finite else 0.0)
-        energy = respond(constants, D, F, 1.0 + dilatation, G, volumetric, tangent, old, new, P, A)
+        energy = evaluate_law(constants, D, F, 1.0 + dilatation, G, volumetric, tangent, old, new, P, A)
         if not A[8, 8] > 0.0:
             return energy, False
         if abs(P[2, 2]) <= TOLERANCE * A[8, 8]:
@@ -183,23 +183,23 @@ def _respond_in_plane_stress(constants, D, bulk, finite, strain_z, F, old, new, 
 
 
 @kernel
-def _respond(
+def _evaluate_point(
     constants, D, bulk, pressure, strain_z, plane_stress, finite, geometric, tangent, F, dilatation, G, old, new, P, A
 ):  # fmt: skip
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress has converged.
 
     `pressure` is due to the projected dilatation, `bulk` is the bulk modulus for the remainder, `dilatation` is J - 1, and
-    G (3, 3) is its derivative. For the other arguments, see `linearise`, `_respond_in_plane_stress` and `respond`.
+    G (3, 3) is its derivative. For the other arguments, see `linearise`, `_solve_plane_stress` and `evaluate_law`.
     """
     omitted = finite and geometric == 0 and tangent
     if plane_stress:
-        energy, converged = _respond_in_plane_stress(constants, D, bulk, finite, strain_z, F, old, new, P, A, G)
+        energy, converged = _solve_plane_stress(constants, D, bulk, finite, strain_z, F, old, new, P, A, G)
         _subtract_initial_stress(omitted, G, determinant(F), P, 0.0, 0.0, A)
         return energy, converged
     J = 1.0 + dilatation
     pressure += bulk * dilatation
     d2J_factor = pressure if finite and geometric == 2 and tangent else min(pressure, 0.0) if omitted else 0.0
-    energy = respond(constants, D, F, J, G, (pressure, bulk, d2J_factor), tangent, old, new, P, A)
+    energy = evaluate_law(constants, D, F, J, G, (pressure, bulk, d2J_factor), tangent, old, new, P, A)
     _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A)
     return energy + 0.5 * bulk * dilatation**2, True
 
@@ -211,7 +211,7 @@ def _subtract_elastic(constants, D, bulk, plane_stress, A):
     F, G = np.zeros((3, 3)), np.empty((3, 3))
     finite, tangent, geometric = np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
     dilatation = _dilatation(F, finite, G)
-    _respond(
+    _evaluate_point(
         constants, D, bulk, 0.0, 0.0, plane_stress, finite, geometric, tangent, F, dilatation, G, no_history, new, P, elastic
     )  # fmt: skip
     A -= elastic
@@ -328,10 +328,10 @@ def _stiffness(left, right, n, dim, bulk, slopes, local):
         for i in range(k + 1):
             for b in range(0, width, 4):
                 for a in range(0, b + 4 if i == k else width, 4):
-                    at = pair * width + b
-                    tile(left, 0, b, right, pair * step, a, n, local, at, True)
+                    out_row = pair * width + b
+                    tile(left, 0, b, right, pair * step, a, n, local, out_row, True)
                     for m in range(0, len(weighted), 4):
-                        tile(weighted, m + k, b, slopes, m + i, a, 1, local, at, False)
+                        tile(weighted, m + k, b, slopes, m + i, a, 1, local, out_row, False)
             pair += 1
 
 
@@ -389,7 +389,7 @@ def linearise(
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
-    stiff, width, n_pairs = tangent and not elastic, -(-n_nodes // 4) * 4, dim * (dim + 1) // 2
+    full_tangent, width, n_pairs = tangent and not elastic, -(-n_nodes // 4) * 4, dim * (dim + 1) // 2
     columns, rows = np.empty((n_nodes, -(-3 * n_q // 4) * 4)), np.empty((3 * n_q, width))
     _tables(dN, columns, rows)
     x, maps, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
@@ -400,22 +400,22 @@ def linearise(
     before, after, factors = np.zeros(9), np.empty(9), np.zeros((3 * n_q, 4))
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     local = np.empty((n_pairs * width, width))
-    mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if stiff else 0, width))
+    mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if full_tangent else 0, width))
     # Numba counts array references by atomic operations where views are created, and in functions that call others in
     # branches. This would take as long as the law of the first invariant itself. Therefore, the law is called directly here.
     row, law, D, direct = -1, constants[0], moduli[0], False
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, in_part):
+        if not find_owned(cells, c, owner, part, in_part):
             continue
         _map(points, displacement, cells, c, columns, x, maps)
         for q in range(n_q):
-            volume[q] = weights[q] * _at_point(maps, q, dim, rows, finite, inverse, gradient, F)
+            volume[q] = weights[q] * _deformation_gradient(maps, q, dim, rows, finite, inverse, gradient, F)
             if axisymmetric:
-                volume[q] *= _about_axis(x, N, q, gradient, F)
+                volume[q] *= _add_hoop_terms(x, N, q, gradient, F)
             if len(rise):
                 strain, rows_of_q = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
-                expansion_ratio, strain_z[q] = _expanded(strain, N[q], cells[c], rise, finite, F, gradient[rows_of_q])
-                volume[q] *= expansion_ratio
+                ratio, strain_z[q] = _remove_expansion(strain, N[q], cells[c], rise, finite, F, gradient[rows_of_q])
+                volume[q] *= ratio
             dilatation[q] = _dilatation(F, finite, G)
             if finite and not dilatation[q] > -1.0:
                 return INVERTED, c
@@ -438,12 +438,12 @@ def linearise(
             if direct:
                 J, total = 1.0 + dilatation[q], pressure[q] + bulk[row, 1] * dilatation[q]
                 volumetric = total, bulk[row, 1], total
-                density, factor, d2J_factor, _, _ = first_invariant(law, F, J, G, volumetric, stiff, P, A)
-                sum_products(2, factor, d2J_factor, stiff, F, A)
+                density, factor, d2J_factor, _, _ = first_invariant(law, F, J, G, volumetric, full_tangent, P, A)
+                sum_products(2, factor, d2J_factor, full_tangent, F, A)
                 density += 0.5 * bulk[row, 1] * dilatation[q] ** 2
             else:
-                density, converged = _respond(
-                    law, D, bulk[row, 1], pressure[q], strain_z[q], plane_stress, finite, geometric, stiff, F,
+                density, converged = _evaluate_point(
+                    law, D, bulk[row, 1], pressure[q], strain_z[q], plane_stress, finite, geometric, full_tangent, F,
                     dilatation[q], G, before, after, P, A,
                 )  # fmt: skip
                 if not converged:

@@ -8,7 +8,7 @@ the other entries are work space. For laws at small strains, F is the displaceme
 variables at the beginning and the end of the load step: the plastic strain (xx, yy, zz, xy, yz, xz, tensor
 components), the equivalent plastic strain, the plastic work [energy / volume], and in plane stress F_zz - 1. At finite
 strains, L - I takes the place of the plastic strain, where L is the lower triangular factor of the inverse plastic metric,
-C_p^-1 = L L^T. For laws that have a bulk modulus, `respond` adds the volumetric part of P and A, and the element loop
+C_p^-1 = L L^T. For laws that have a bulk modulus, `evaluate_law` adds the volumetric part of P and A, and the element loop
 adds that of the energy, U(J) = K (J - 1)^2 / 2.
 """
 
@@ -64,7 +64,7 @@ def _add_second_derivative(F, factor, A):
 
 @kernel
 def _add_volumetric(F, G, volumetric, tangent, P, A):
-    """Add the `volumetric` terms to P and, if `tangent` is true, to A; see `respond`."""
+    """Add the `volumetric` terms to P and, if `tangent` is true, to A; see `evaluate_law`."""
     pressure, bulk, d2J_factor = volumetric
     for i in range(3):
         for j in range(3):
@@ -159,16 +159,16 @@ def _plastic(constants, F, tangent, old, new, P, A):
     increment = p - old[6]
     flow = 1.5 * increment / trial if increment > 0.0 else 0.0
     new[6] = p
-    before = after = energy = 0.0
+    old_square = new_square = energy = 0.0
     for i in range(3):
         for j in range(3):
             c = voigt(i, j)
-            before += old[c] ** 2
+            old_square += old[c] ** 2
             new[c] = old[c] + flow * xi[3 * i + j]
-            after += new[c] ** 2
+            new_square += new[c] ** 2
             P[i, j] = 2.0 * mu * (0.5 * (F[i, j] + F[j, i]) - (mean if i == j else 0.0) - new[c])
             energy += P[i, j] * P[i, j] / (4.0 * mu)
-    new[7] = work + H / 3.0 * (after - before)
+    new[7] = work + H / 3.0 * (new_square - old_square)
     if not (tangent or increment > 0.0):
         return energy
     shear = 2.0 * mu * (1.0 - 2.0 * mu * flow)
@@ -197,20 +197,20 @@ def _first_piola_kirchhoff(F, S, P):
 @kernel
 def _push_forward(F, S, C, A):
     """Fill A, given the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) for Green-Lagrange strains."""
-    half = np.empty((9, 9))
+    pushed = np.empty((9, 9))
     for i in range(3):
         for j in range(3):
             for column in range(9):
                 value = 0.0
                 for k in range(3):
                     value += F[i, k] * C[3 * k + j, column]
-                half[3 * i + j, column] = value
+                pushed[3 * i + j, column] = value
     for row in range(9):
         for k in range(3):
             for m in range(3):
                 value = S[row % 3, m] if row // 3 == k else 0.0
                 for n in range(3):
-                    value += half[row, 3 * n + m] * F[k, n]
+                    value += pushed[row, 3 * n + m] * F[k, n]
                 A[row, 3 * k + m] = value
 
 
@@ -354,7 +354,7 @@ def _add_isochoric(value, first, number, power, scale, J, G, dW, d2W, tangent, P
 def first_invariant(constants, F, J, G, volumetric, tangent, P, A):
     """Fill P and the work space of A for a polynomial law of the isochoric first invariant with `volumetric` terms.
 
-    The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 (Yeoh, 1993); see `respond` for the other terms. Except
+    The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 (Yeoh, 1993); see `evaluate_law` for the other terms. Except
     for second derivatives, the tangent is a sum of dyadic products of the rows LEFT + k and RIGHT + k of A. The rows
     from RIGHT on are G, F and, if there is another invariant, the derivative of half of it. Returns the energy density, the
     factors of the second derivatives of I1 / 2 (the identity) and J, I1 and ``J**(-2/3)``.
@@ -392,7 +392,7 @@ def sum_products(n, factor, d2J_factor, tangent, F, A):
 
 @kernel
 def _invariants(constants, F, J, G, volumetric, tangent, P, A):
-    """Apply a polynomial law of the isochoric invariants (Rivlin and Saunders, 1951); see `first_invariant`, `respond`."""
+    """Apply a polynomial law of the isochoric invariants (Rivlin and Saunders, 1951); see `first_invariant`."""
     C01 = constants[4]
     energy, factor, d2J_factor, I1, scale = first_invariant(constants, F, J, G, volumetric, tangent, P, A)
     if C01 != 0.0:
@@ -469,7 +469,7 @@ def _ogden(constants, F, tangent, P, A):
 
 
 @kernel
-def _other(constants, D, F, tangent, old, new, P, A):
+def _other_law(constants, D, F, tangent, old, new, P, A):
     """Apply a law other than `_invariants`; return the elastic energy density without the volumetric part."""
     law = int(constants[0])
     if law == LINEAR:
@@ -484,7 +484,7 @@ def _other(constants, D, F, tangent, old, new, P, A):
 
 
 @kernel
-def respond(constants, D, F, J, G, volumetric, tangent, old, new, P, A):
+def evaluate_law(constants, D, F, J, G, volumetric, tangent, old, new, P, A):
     """Fill `new`, P and A according to the law of `constants`, and return the elastic energy [energy / volume].
 
     The energy does not include the volumetric part of the law. `volumetric` contains a pressure, a bulk modulus and a factor:
@@ -496,6 +496,6 @@ def respond(constants, D, F, J, G, volumetric, tangent, old, new, P, A):
         new[e] = old[e]
     if int(constants[0]) == INVARIANTS:
         return _invariants(constants, F, J, G, volumetric, tangent, P, A)
-    energy = _other(constants, D, F, tangent, old, new, P, A)
+    energy = _other_law(constants, D, F, tangent, old, new, P, A)
     _add_volumetric(F, G, volumetric, tangent or new[6] > old[6], P, A)
     return energy

@@ -28,24 +28,24 @@ CONSISTENCY_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Stiffness:
-    """A stiffness matrix in the form of a sum of matrices, `parts` (n, n) [force / length].
+    """A stiffness matrix in the form of a sum of matrices, `terms` (n, n) [force / length].
 
-    Without multi-point constraints, there are two parts: the matrix of the linear solver, and the rows and columns of
+    Without multi-point constraints, there are two terms: the matrix of the linear solver, and the rows and columns of
     supports that were removed from it.
     """
 
-    parts: tuple[Any, ...]
+    terms: tuple[Any, ...]
 
     def __matmul__(self, u: Array) -> Array:
-        total = np.asarray(self.parts[0] @ u)
-        for matrix in self.parts[1:]:
+        total = np.asarray(self.terms[0] @ u)
+        for matrix in self.terms[1:]:
             total += matrix @ u
         return total
 
     def absolute_product(self, u: Array) -> Array:
-        """Return ``|K| |u|`` (n,), summed over the parts; the round-off of ``K u`` is proportional to it [force]."""
+        """Return ``|K| |u|`` (n,), summed over the terms; the round-off of ``K u`` is proportional to it [force]."""
         return sum(
-            (K.absolute_product(u) if hasattr(K, "absolute_product") else abs(K) @ np.abs(u) for K in self.parts),
+            (K.absolute_product(u) if hasattr(K, "absolute_product") else abs(K) @ np.abs(u) for K in self.terms),
             np.zeros(u.shape),
         )
 
@@ -132,7 +132,7 @@ class System(ConstrainedMotion):
         Supported components, and components without stiffness or constraint, whose displacements are zero.
     free : ndarray of bool (n,)
         The unknowns.
-    weightless : ndarray of bool (n,)
+    zero_stiffness : ndarray of bool (n,)
         Unknowns without stiffness: those of rigid obstacles, and those for motions of bodies that constraints make rigid.
     """
 
@@ -141,18 +141,18 @@ class System(ConstrainedMotion):
         without_stiffness: Mask | None = None,
     ) -> None:  # fmt: skip
         R = stacked_rows(relations, K.shape[0])
-        related = np.zeros(K.shape[0], bool)
-        related[R.indices] = True
+        constrained = np.zeros(K.shape[0], bool)
+        constrained[R.indices] = True
         if without_stiffness is None:
             without_stiffness = np.zeros(K.shape[0], bool)
         diagonal = K.diagonal()
-        super().__init__(supported | ((diagonal == 0.0) & ~related & ~without_stiffness), relations)
-        self._reacting: Mask = self.fixed | related  # supports and constraints may exert forces here
+        super().__init__(supported | ((diagonal == 0.0) & ~constrained & ~without_stiffness), relations)
+        self._reacting: Mask = self.fixed | constrained  # supports and constraints may exert forces here
         self._independent, self._without_stiffness = self.free, without_stiffness
-        self._entries: _SupportedEntries | None = None  # of the last `renewed` matrix
+        self._entries: _SupportedEntries | None = None  # of the last `with_stiffness` matrix
         self._set_stiffness(K, diagonal)
 
-    def renewed(self, K: bsr_array) -> System:
+    def with_stiffness(self, K: bsr_array) -> System:
         """Return the system with a different stiffness K (n, n) [force / length], which is modified as by the constructor."""
         pattern = self._entries.pattern if self._entries else ()
         if self.T is None and not (pattern and all(map(np.array_equal, pattern, (K.indptr, K.indices)))):
@@ -167,8 +167,8 @@ class System(ConstrainedMotion):
         self.free = self._independent.copy()
         if self.T is None:
             self.K = Stiffness((K, self._entries.remove_from(K)) if self._entries else separate_supports(K, self.fixed))
-            self.matrix = self.K.parts[0]
-            self.weightless: Mask = self.free & (diagonal_of_K == 0.0)
+            self.matrix = self.K.terms[0]
+            self.zero_stiffness: Mask = self.free & (diagonal_of_K == 0.0)
         else:
             self.K = Stiffness((K,))
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
@@ -178,25 +178,25 @@ class System(ConstrainedMotion):
             magnitude = self.T.multiply(self.T).T @ diagonal_of_K
             # Points without stiffness that constraints couple only with each other are excluded from the unknowns.
             self.free &= (magnitude > 0.0) | self._without_stiffness
-            self.weightless = self.free & (diagonal <= ROUND_OFF * magnitude)
+            self.zero_stiffness = self.free & (diagonal <= ROUND_OFF * magnitude)
             self.matrix = separate_supports(transformed, ~self.free)[0]
-        self._no_unknowns = np.flatnonzero(~self.free)
+        self._eliminated = np.flatnonzero(~self.free)
 
-    def keep(self, matrix: Any) -> None:
+    def set_matrix(self, matrix: Any) -> None:
         """Replace `matrix` by the return value of `LinearSolver.prepare`."""
-        if self.K.parts[0] is self.matrix:
-            self.K = Stiffness((matrix, *self.K.parts[1:]))
+        if self.K.terms[0] is self.matrix:
+            self.K = Stiffness((matrix, *self.K.terms[1:]))
         self.matrix = matrix
 
-    def right(self, f: Array, t: Array) -> Array:
+    def right_side(self, f: Array, t: Array) -> Array:
         """Return the right-hand side (n,) of the solver for forces `f` (n,) on all displacements [force]."""
         # Without constraints, t contains only displacements of supports, which load the unknowns through the removed columns.
-        return self.reduced(f - (self.K.parts[1] if self.T is None else self.K) @ t)
+        return self.reduced(f - (self.K.terms[1] if self.T is None else self.K) @ t)
 
     def reduced(self, force: Array) -> Array:
         """Return the forces (n,) on the unknowns that do the same work as `force` (n,) on all displacements [force]."""
         forces = force.copy() if self.T is None else self.T.T @ force
-        forces[self._no_unknowns] = 0.0
+        forces[self._eliminated] = 0.0
         return forces
 
     def rows(self, rows: csr_array, offset: Array, t: Array) -> tuple[csr_array, Array]:
@@ -214,14 +214,14 @@ class System(ConstrainedMotion):
     def unknowns(self, u: Array, t: Array | float = 0.0) -> Array:
         """Return the unknowns v (n,) [length] of displacements u (n,) that satisfy the constraints."""
         v = u - t
-        v[self._no_unknowns] = 0.0
+        v[self._eliminated] = 0.0
         return v
 
     def unknowns_of(self, motions: Array) -> Array:
         """Return the unknowns (n, k) of motions (n, k) that satisfy homogeneous supports and constraints."""
         return np.where(self.free[:, None], motions, 0.0)
 
-    def involved(self, dofs: Indices) -> Indices:
+    def involved_unknowns(self, dofs: Indices) -> Indices:
         """Return the unknowns (k,) on which the displacements `dofs` (m,) depend, in ascending order."""
         if self.T is not None:
             dofs = np.unique(self.T[dofs].indices)
@@ -281,13 +281,13 @@ class _SupportedEntries:
     def remove_from(self, K: bsr_array) -> csr_array:
         """Set the entries of K to zero, except for positive numbers on the diagonal, and return the removed part."""
         K.data = np.ascontiguousarray(K.data)
-        numbers = K.data.reshape(-1)
-        removed = numbers[self._positions]
+        entries = K.data.reshape(-1)
+        removed = entries[self._positions]
         diagonal = removed[self._diagonal]
-        if not (stiff := diagonal > 0.0).all():
-            diagonal[~stiff] = self.diagonal_of(K).max(initial=1.0)
-        numbers[self._positions] = 0.0
-        numbers[self._positions[self._diagonal]] = diagonal
+        if not (is_positive := diagonal > 0.0).all():
+            diagonal[~is_positive] = self.diagonal_of(K).max(initial=1.0)
+        entries[self._positions] = 0.0
+        entries[self._positions[self._diagonal]] = diagonal
         removed[self._diagonal] -= diagonal
         difference = csr_array((removed, self._columns, self._start), shape=K.shape, copy=True)
         difference.eliminate_zeros()
@@ -296,15 +296,15 @@ class _SupportedEntries:
 
 def _with_diagonal(K: bsr_array) -> bsr_array:
     """Return K with a diagonal block in every block row; blocks that were not stored are zero."""
-    present = np.zeros(len(K.indptr) - 1, bool)
-    block_row = np.repeat(np.arange(len(present)), np.diff(K.indptr))
-    present[block_row[block_row == K.indices]] = True
-    missing = np.flatnonzero(~present)
+    has_diagonal = np.zeros(len(K.indptr) - 1, bool)
+    block_row = np.repeat(np.arange(len(has_diagonal)), np.diff(K.indptr))
+    has_diagonal[block_row[block_row == K.indices]] = True
+    missing = np.flatnonzero(~has_diagonal)
     if not len(missing):
         return K
     size = K.blocksize[0]
     rows, columns = np.r_[block_row, missing], np.r_[K.indices, missing]
     order = np.lexsort((columns, rows))
     data = np.concatenate([K.data, np.zeros((len(missing), size, size))])[order]
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(present)))])
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(has_diagonal)))])
     return bsr_array((data, columns[order], indptr), shape=K.shape)

@@ -70,14 +70,14 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     return Split(deviatoric, np.column_stack([bulk, bulk_remainder]))
 
 
-def projected(name: str, corners: Array, values: Array, xi: Array, axisymmetric: bool) -> Array:
+def projected(name: str, coordinates: Array, values: Array, xi: Array, axisymmetric: bool) -> Array:
     """Return the mean and the remainder (n_cells, 2, n) of a field, projected like the dilatation [unit of the field].
 
     Parameters
     ----------
     name : str
         Element type.
-    corners : ndarray (n_cells, n_nodes, dim)
+    coordinates : ndarray (n_cells, n_nodes, dim)
         Nodes of the cells [length].
     values : ndarray (n_cells, n_q)
         The field at the quadrature points [unit of the field].
@@ -86,7 +86,7 @@ def projected(name: str, corners: Array, values: Array, xi: Array, axisymmetric:
     axisymmetric : bool
     """
     N, dN, weights = elements.get(name).tables
-    volume = cell_volumes(corners, N, dN, axisymmetric) * weights
+    volume = cell_volumes(coordinates, N, dN, axisymmetric) * weights
     polynomials = basis(name, elements.get(name).quadrature[0])
     mass = np.einsum("cq,qm,qn->cmn", volume, polynomials, polynomials)
     moments = np.einsum("cq,qm,cq->cm", volume, polynomials, values)

@@ -15,7 +15,7 @@ matrix B of the bulk moduli (Hughes, Int. J. Numer. Meth. Engng 15, 1980).
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
+from fastcontact.elasticity.element_2d_kernels import TWO_PI, find_owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
 
@@ -115,7 +115,7 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
     row, in_part = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
         factors[:], factors[0] = bulk[material[c], 1], bulk[material[c], 0]
-        if factors[0] == 0.0 or not owned(cells, c, owner, part, in_part):
+        if factors[0] == 0.0 or not find_owned(cells, c, owner, part, in_part):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g)
@@ -137,7 +137,7 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
     mass, g = np.empty((size, size)), np.empty((size, n_nodes * dim))
     moment, coefficient = np.empty((size, 1)), np.empty(size)
     for c in range(n_cells):
-        bulk_mean, bulk_rest = bulk[material[c], 0], bulk[material[c], 1]
+        bulk_mean, bulk_remainder = bulk[material[c], 0], bulk[material[c], 1]
         if bulk_mean == 0.0:
             continue
         at_nodes(points, cells, c, x)
@@ -149,7 +149,7 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
                 moment[m, 0] += g[m, k] * u[k // dim, k % dim]
         reduce(mass, moment)
         for m in range(size):
-            coefficient[m] = moment[m, 0] * (bulk_mean if m == 0 else bulk_rest)
+            coefficient[m] = moment[m, 0] * (bulk_mean if m == 0 else bulk_remainder)
         back_substitute(mass, coefficient)
         for k in range(basis_out.shape[0]):
             mean_stress = 0.0

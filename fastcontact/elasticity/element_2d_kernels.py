@@ -35,7 +35,7 @@ def _map(points, cell, N, dN, q, gradient):
 
 
 @kernel
-def owned(cells, c, owner, part, in_part):
+def find_owned(cells, c, owner, part, in_part):
     """Fill `in_part` (n_nodes,) with whether the nodes of cell `c` belong to `part`; return whether any of them do."""
     any_in_part = False
     for a in range(cells.shape[1]):
@@ -85,7 +85,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     local = np.empty((n_nodes, n_nodes, 2, 2))
     in_part = np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, in_part):
+        if not find_owned(cells, c, owner, part, in_part):
             continue
         local[:] = 0.0
         if not _integrate(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):

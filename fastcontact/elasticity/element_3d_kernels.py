@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.elasticity.constitutive_kernels import voigt
-from fastcontact.elasticity.element_2d_kernels import owned
+from fastcontact.elasticity.element_2d_kernels import find_owned
 from fastcontact.mesh.jacobian_kernels import cofactors, jacobian_3d, transposed
 
 
@@ -89,16 +89,16 @@ def add_block(flat, add_upper, add_lower, upper, lower, block):
 
 
 @inlined_kernel
-def _add_isotropic_block(flat, differ, add_upper, add_lower, upper, lower, lam, mu, g):
+def _add_isotropic_block(flat, distinct, add_upper, add_lower, upper, lower, lam, mu, g):
     """Add the block of two nodes for Lamé's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
-    `differ` states whether the nodes differ. The order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
+    `distinct` states whether the nodes differ. The order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
     """
     xx, yy, zz, xy, xz, yz, yx, zx, zy = g
     trace, lam_mu = mu * (xx + yy + zz), lam + mu
     k01, k02, k12 = lam * xy + mu * yx, lam * xz + mu * zx, lam * yz + mu * zy
     k10, k20, k21 = lam * yx + mu * xy, lam * zx + mu * xz, lam * zy + mu * yz
-    if not differ:  # equal up to round-off; makes K bitwise symmetric
+    if not distinct:  # equal up to round-off; makes K bitwise symmetric
         k10, k20, k21 = k01, k02, k12
     block = lam_mu * xx + trace, k01, k02, k10, lam_mu * yy + trace, k12, k20, k21, lam_mu * zz + trace
     add_block(flat, add_upper, add_lower, upper, lower, block)
@@ -183,7 +183,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
         volume += weight
     flat = data.reshape(-1)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, in_part):
+        if not find_owned(cells, c, owner, part, in_part):
             continue
         lam, mu = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
         if n_nodes == 4 and isotropic[material[c]]:

@@ -24,40 +24,40 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
     return np.einsum("cni,cni->cn", stress, strain.reshape(stress.shape))
 
 
-def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
+def cell_volumes(coordinates: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
     """Return det J (n_cells, n_q) [length^dim], the ratio of the volume of a cell to that of the reference cell at points.
 
     In axisymmetry, det J is multiplied by the circumference 2 pi r [length^3].
 
-    The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], the shape functions
+    The arguments are the nodes of the cells, `coordinates` (n_cells, n_nodes, dim) [length], the shape functions
     `N` (n_q, n_nodes) [-], and their derivatives `dN` (n_q, n_nodes, dim) [-].
     """
     n_q, n_nodes, dim = dN.shape
-    J = corners.transpose(0, 2, 1) @ dN.transpose(1, 0, 2).reshape(n_nodes, -1)
+    J = coordinates.transpose(0, 2, 1) @ dN.transpose(1, 0, 2).reshape(n_nodes, -1)
     volume = quadrature.determinants(J.reshape(-1, dim, n_q, dim).transpose(0, 2, 1, 3))
     if axisymmetric:
-        volume *= 2.0 * np.pi * np.einsum("qa,ca->cq", N, corners[:, :, 0])
+        volume *= 2.0 * np.pi * np.einsum("qa,ca->cq", N, coordinates[:, :, 0])
     return np.asarray(volume)
 
 
-def gradients_at(corners: Array, dN: Array) -> tuple[Array, Array]:
+def gradients_at(coordinates: Array, dN: Array) -> tuple[Array, Array]:
     """Return the gradients (n_cells, n_q, n_nodes, dim) of shape functions [1 / length], and det J (n_cells, n_q).
 
-    The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], and the derivatives of the shape
+    The arguments are the nodes of the cells, `coordinates` (n_cells, n_nodes, dim) [length], and the derivatives of the shape
     functions `dN` (n_q, n_nodes, dim) [-].
     """
-    inverse, determinant = _inverses(derivatives_at(corners, dN))
+    inverse, determinant = _inverses(derivatives_at(coordinates, dN))
     return np.einsum("qak,cqkd->cqad", dN, inverse, optimize=True), determinant
 
 
-def slopes_at(displacement: Array, corners: Array, dN: Array) -> tuple[Array, Array]:
+def slopes_at(displacement: Array, coordinates: Array, dN: Array) -> tuple[Array, Array]:
     """Return the gradients (n_cells, n_q, dim, dim) of a displacement field [-], and det J (n_cells, n_q).
 
     The arguments are the nodal displacements `displacement` (n_cells, n_nodes, dim) [length], and those of `gradients_at`,
-    `corners` (n_cells, n_nodes, dim) [length] and `dN` (n_q, n_nodes, dim) [-]. The last index of the gradients is the
+    `coordinates` (n_cells, n_nodes, dim) [length] and `dN` (n_q, n_nodes, dim) [-]. The last index of the gradients is the
     direction of differentiation.
     """
-    inverse, determinant = _inverses(derivatives_at(corners, dN))
+    inverse, determinant = _inverses(derivatives_at(coordinates, dN))
     return np.asarray(derivatives_at(displacement, dN) @ inverse), determinant
 
 

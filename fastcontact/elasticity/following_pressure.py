@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 POINTS = 4
 
 
-class FollowingPressure:
+class FollowerPressure:
     """A pressure along the normals of deformed facets, whose values are evaluated at reference positions.
 
     Parameters

@@ -16,7 +16,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import kernel
 from fastcontact.elasticity.dilatation_kernels import add_products, back_substitute, reduce
-from fastcontact.elasticity.element_2d_kernels import owned
+from fastcontact.elasticity.element_2d_kernels import find_owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
 
@@ -90,7 +90,7 @@ def subtract_stiffness(
     x, row, in_part = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     modal, mixed, factors = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.full(n_modes, -1.0)
     for c in range(n_cells):
-        if not with_modes[material[c, 0]] or not owned(cells, c, owner, part, in_part):
+        if not with_modes[material[c, 0]] or not find_owned(cells, c, owner, part, in_part):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)

@@ -11,7 +11,7 @@ import numpy as np
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Table, check_number, listed
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames, rotations
-from fastcontact.elasticity.varying_constants import Cells, Varying, positions, wrapped
+from fastcontact.elasticity.varying_constants import Cells, Varying, positions, wrap_varying
 from fastcontact.errors import ModelError, check_known
 from fastcontact.round_off import ROUND_OFF
 
@@ -102,13 +102,13 @@ def initial_state(
     for component in values:
         check_known(f"component of {label}", component, COMPONENTS, ModelError)
     for number, component in enumerate(COMPONENTS):
-        value = wrapped(values.get(component))
+        value = wrap_varying(values.get(component))
         if value is None:
             continue
         if number > 3 and kinematics != "3d":
             raise ModelError(f"{label} has the component {component}, which {kinematics} does not have")
         if isinstance(value, Varying):
-            value = Varying(value.given, cells, f"the component {component} of {label}")
+            value = Varying(value.source, cells, f"the component {component} of {label}")
         else:
             check_number(f"the component {component} of {label}", value)
         components[number] = value
@@ -137,7 +137,7 @@ class StressOffset:
     expansion: Array
     states: Sequence[tuple[float, InitialState]] = ()
 
-    def initial(self, kind: str, element: str, rows: Indices, N: Array) -> Array | None:
+    def sum_of_states(self, kind: str, element: str, rows: Indices, N: Array) -> Array | None:
         """Return the sum of initial stresses [pressure] or strains [-], (n_rows, n, n_components); None if there are none.
 
         The `kind` is ``"stress"`` or ``"strain"``, and the other arguments are those of `InitialState.values`.

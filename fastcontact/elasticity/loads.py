@@ -70,7 +70,7 @@ class Load:
         return f"{self.KIND} on '{self.group}'"
 
     @property
-    def places(self) -> tuple[str, ...]:
+    def group_names(self) -> tuple[str, ...]:
         """Names of the groups on which the load acts."""
         return (self.group,)
 
@@ -176,7 +176,7 @@ class VolumeLoad(Load):
         return f"{self.KIND} on {listed(self.groups)}"
 
     @property
-    def places(self) -> tuple[str, ...]:
+    def group_names(self) -> tuple[str, ...]:
         """Names of the groups on which the load acts."""
         return (EVERYWHERE,) if self.groups is None else self.groups
 
@@ -269,17 +269,17 @@ def solid_points(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
     return np.unique(np.concatenate([mesh.cells[name][rows[name]].ravel() for name in rows]))
 
 
-def check_solids(mesh: Mesh, groups: Sequence[str] | None, otherwise: str) -> None:
-    """Raise ModelError if one of the groups contains no solid cells; the message ends with `otherwise`."""
+def check_solids(mesh: Mesh, groups: Sequence[str] | None, consequence: str) -> None:
+    """Raise ModelError if one of the groups contains no solid cells; the message ends with `consequence`."""
     for group in groups or ():
         if not mesh.cells_of(group, dim=mesh.dim):
-            raise ModelError(f"group '{group}' contains no solid cells{otherwise}")
+            raise ModelError(f"group '{group}' contains no solid cells{consequence}")
 
 
-def check_points(mesh: Mesh, group: str, otherwise: str) -> None:
-    """Raise ModelError if a group is empty; the message ends with `otherwise`."""
+def check_points(mesh: Mesh, group: str, consequence: str) -> None:
+    """Raise ModelError if a group is empty; the message ends with `consequence`."""
     if not len(mesh.points_of(group)):
-        raise ModelError(f"group '{group}' is empty: {otherwise}")
+        raise ModelError(f"group '{group}' is empty: {consequence}")
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
@@ -320,9 +320,9 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
             f"{name} is a function that returned {array.dtype} numbers of shape {array.shape} for {len(flat)} points: "
             f"it must return one real number per point, shape ({len(flat)},)"
         )
-    bad = np.flatnonzero(~np.isfinite(array))
-    if len(bad):
-        raise ModelError(f"{name} is {array[bad[0]]} at {flat[bad[0]]}: it must be finite everywhere")
+    not_finite = np.flatnonzero(~np.isfinite(array))
+    if len(not_finite):
+        raise ModelError(f"{name} is {array[not_finite[0]]} at {flat[not_finite[0]]}: it must be finite everywhere")
     if np.abs(array).max(initial=0.0) > LARGEST:
         raise ModelError(
             f"{name} is out of range: its magnitude must be at most {LARGEST:g} everywhere, whatever its unit"
@@ -345,7 +345,7 @@ def check_value(name: str, value: Any) -> None:
         check_number(name, value)
 
 
-def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
+def axis_values(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
     """Return the components that are not None by axis number, given `components` by the axis names x, y and z.
 
     Raises ModelError if all components are None, or if an axis does not exist in `dim` dimensions. The message begins with

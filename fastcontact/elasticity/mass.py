@@ -30,18 +30,18 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField, groups: Sequence[st
     """
     missing, selected = 0, solid_rows(mesh, groups)
 
-    def local(name: str, rows: Indices) -> Array:
+    def cell_matrices(name: str, rows: Indices) -> Array:
         nonlocal missing
         element = elements.get(name)
         xi, weights = integration_rule(element)
-        N, corners = element.shape(xi), mesh.points[mesh.cells[name][rows]]
+        N, coordinates = element.shape(xi), mesh.points[mesh.cells[name][rows]]
         rho = density.at(name, rows, N)
         missing += int(np.isnan(rho).any(axis=1).sum())
         rho *= np.isin(rows, selected.get(name, ()))[:, None]
-        volume = cell_volumes(corners, N, element.gradient(xi), kinematics == "axisymmetric") * weights
+        volume = cell_volumes(coordinates, N, element.gradient(xi), kinematics == "axisymmetric") * weights
         return np.einsum("cq,qa,qb->cab", rho * volume, N, N, optimize=True)[..., None]
 
-    matrix = _diagonal_blocks(mesh, local)
+    matrix = _diagonal_blocks(mesh, cell_matrices)
     if missing:
         raise ModelError(
             f"modes need densities, but the materials of {missing} solid cells have none: give them density=..., 0.0 for a "
@@ -68,50 +68,50 @@ def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, An
     axisymmetric : bool
     """
 
-    def local(name: str, rows: Indices) -> Array:
+    def cell_matrices(name: str, rows: Indices) -> Array:
         element, cells = elements.get(name), mesh.cells[name][rows]
         xi, weights = element.quadrature
         N, dN, _ = element.tables
-        corners = mesh.points[cells]
+        coordinates = mesh.points[cells]
         stress = stresses.at(name, xi, cells, material[name][rows], rows)
-        gradient, _ = gradients_at(corners, dN)
-        weighted = cell_volumes(corners, N, dN, axisymmetric)[..., None] * weights[:, None] * stress
+        gradient, _ = gradients_at(coordinates, dN)
+        weighted = cell_volumes(coordinates, N, dN, axisymmetric)[..., None] * weights[:, None] * stress
         tensor = weighted[..., PAIRS[mesh.dim]]
         integrals = np.einsum("cqai,cqij,cqbj->cab", gradient, tensor, gradient, optimize=True)
         by_component = np.repeat(integrals[..., None], mesh.dim, axis=3)
         if axisymmetric:
-            radius = np.einsum("qa,ca->cq", N, corners[:, :, 0])
+            radius = np.einsum("qa,ca->cq", N, coordinates[:, :, 0])
             by_component[..., 0] += np.einsum("cq,qa,qb->cab", weighted[:, :, 2] / radius**2, N, N, optimize=True)
         return by_component
 
-    return _diagonal_blocks(mesh, local)
+    return _diagonal_blocks(mesh, cell_matrices)
 
 
-def _diagonal_blocks(mesh: Mesh, local: Callable[[str, Indices], Array]) -> bsr_array:
+def _diagonal_blocks(mesh: Mesh, cell_matrices: Callable[[str, Indices], Array]) -> bsr_array:
     """Return the matrix with diagonal nodal blocks, assembled from the diagonals (n_cells, n_nodes, n_nodes, dim or 1)."""
-    pattern, diagonals = assembled(mesh, local)
+    pattern, diagonals = assembled(mesh, cell_matrices)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
     data[:, range(mesh.dim), range(mesh.dim)] = diagonals
     n = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
 
 
-def assembled(mesh: Mesh, local: Callable[[str, Indices], Array]) -> tuple[Sparsity, Array]:
+def assembled(mesh: Mesh, cell_matrices: Callable[[str, Indices], Array]) -> tuple[Sparsity, Array]:
     """Return the sparsity of a mesh, and the sums (n_blocks, k) of the matrices of all cells for its blocks.
 
-    The function `local` is called with an element type and the numbers (n_cells,) of some cells, and returns the matrices of
-    these cells (n_cells, n_nodes, n_nodes, k).
+    The function `cell_matrices` is called with an element type and the numbers (n_cells,) of some cells, and returns the
+    matrices of these cells (n_cells, n_nodes, n_nodes, k).
     """
     pattern = sparsity(mesh)
     total = np.zeros((len(pattern.indices), 1))
-    for name, rows in portions(mesh):
-        blocks, slots = local(name, rows), pattern.slots[name][rows].ravel()
+    for name, rows in cell_portions(mesh):
+        blocks, slots = cell_matrices(name, rows), pattern.slots[name][rows].ravel()
         sums = [np.bincount(slots, entries.ravel(), len(total)) for entries in np.moveaxis(blocks, 3, 0)]
         total = total + np.stack(sums, axis=1)
     return pattern, total
 
 
-def portions(mesh: Mesh) -> Iterator[tuple[str, Indices]]:
+def cell_portions(mesh: Mesh) -> Iterator[tuple[str, Indices]]:
     """Yield element types and numbers (n,) of solid cells, in portions that limit the memory."""
     for name, cells in mesh.solids.items():
         n_q = len(integration_rule(elements.get(name))[1])

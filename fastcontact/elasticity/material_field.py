@@ -110,14 +110,14 @@ class MaterialField:
     @cached_property
     def compliance(self) -> Array:
         """Compliances (n_moduli, n_components, n_components) [1 / pressure]; see `Material.compliance_at`."""
-        return self._evaluated(np.zeros_like(self.moduli), "compliance_at")
+        return self._fill_values(np.zeros_like(self.moduli), "compliance_at")
 
     @cached_property
     def expansion(self) -> Array:
         """Thermal expansion coefficients (n_moduli, n_components) [1 / temperature]; NaN for materials without expansion."""
-        return self._evaluated(np.zeros(self.moduli.shape[:2]), "expansion_at")
+        return self._fill_values(np.zeros(self.moduli.shape[:2]), "expansion_at")
 
-    def _evaluated(self, values: Array, method: str) -> Array:
+    def _fill_values(self, values: Array, method: str) -> Array:
         """Fill `values` (n_moduli, ...) with the results of a method of the materials, and return `values`."""
         arbitrary_point = np.zeros((1, 3 if self.kinematics == "3d" else 2))
         for number, material in enumerate(self.materials):
@@ -162,8 +162,8 @@ class MaterialField:
         Equal materials have the same moduli, axes and expansion, so that the stress is continuous across their interface.
         """
         first_number: dict[object, int] = {}
-        laws = [_law_key(material, moduli) for material, moduli in zip(self.materials, self.moduli, strict=False)]
-        representative = np.array([first_number.setdefault(law, number) for number, law in enumerate(laws)], np.int32)
+        keys = [_law_key(material, moduli) for material, moduli in zip(self.materials, self.moduli, strict=False)]
+        representative = np.array([first_number.setdefault(law, number) for number, law in enumerate(keys)], np.int32)
         return {name: representative[values] for name, values in self.material_numbers.items()}
 
 

@@ -17,7 +17,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Value
 from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
-from fastcontact.elasticity.varying_constants import Cells, Varying, mapped, varying, wrapped
+from fastcontact.elasticity.varying_constants import Cells, Varying, map_constants, varying_items, wrap_varying
 from fastcontact.errors import ModelError, check_known
 from fastcontact.round_off import ROUND_OFF
 
@@ -96,12 +96,12 @@ class Material:
     @property
     def varies(self) -> bool:
         """Whether material axes, moduli or thermal expansion depend on position."""
-        return callable(self.axes) or self.graded or bool(varying(self.expansion) or varying(self.axes))
+        return callable(self.axes) or self.graded or bool(varying_items(self.expansion) or varying_items(self.axes))
 
     @property
     def graded(self) -> bool:
         """Whether constants that determine the moduli depend on position."""
-        return any(varying(getattr(self, name, None)) for name in MODULI)
+        return any(varying_items(getattr(self, name, None)) for name in MODULI)
 
     @property
     def varies_inside(self) -> bool:
@@ -109,33 +109,33 @@ class Material:
 
         Cells with a mean dilatation use the constants at their centres instead.
         """
-        varying_constants = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
-        return (callable(self.axes) or any(v.varies_within_cells for v in varying_constants)) and not self.averaged
+        varying = [v for name in (*MODULI, "expansion") for v in varying_items(getattr(self, name, None))]
+        return (callable(self.axes) or any(v.varies_within_cells for v in varying)) and not self.averaged
 
-    def check_thermal_and_density(self, most: int) -> None:
+    def check_thermal_and_density(self, n_axes: int) -> None:
         """Raise ModelError if the density is negative or a thermal constant is inadmissible.
 
         For thermal constants, see `check_expansion` and `check_conductivity`. A material may have one constant of each kind,
-        or `most` constants, which is 3 for materials with axes and 1 otherwise. Constants that vary are checked by `bound`.
+        or `n_axes`, which is 3 for materials with axes and 1 otherwise. Constants that vary are checked by `bound`.
         """
         density = self.density
         if not isinstance(density, Varying) and density is not None and not 0.0 <= _real(density) < math.inf:
             raise ModelError(f"the density = {density} must be a non-negative number")
-        check_expansion(self.expansion, most)
-        check_conductivity(self.conductivity, most)
+        check_expansion(self.expansion, n_axes)
+        check_conductivity(self.conductivity, n_axes)
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
         """Return a copy of the material whose varying constants are assigned to `cells`, so that they can be evaluated.
 
         Raises ModelError if a varying constant is not admissible somewhere in these cells.
         """
-        names = [name for name in (*CONSTANTS, "axes") if varying(getattr(self, name, None))]
+        names = [name for name in (*CONSTANTS, "axes") if varying_items(getattr(self, name, None))]
         if not names:
             return self
 
         def with_cells(name: str) -> Any:
             constant, label = getattr(self, name), f"the constant {name} of the material"
-            return mapped(constant, lambda v: type(v)(v.given, cells, label) if isinstance(v, Varying) else v)
+            return map_constants(constant, lambda v: type(v)(v.source, cells, label) if isinstance(v, Varying) else v)
 
         bound_material = copy.copy(self)
         for name in names:
@@ -153,7 +153,7 @@ class Material:
         """
 
         def at(value: Any) -> Any:
-            return mapped(value, lambda v: v.at(name, rows, N) if isinstance(v, Varying) else v)
+            return map_constants(value, lambda v: v.at(name, rows, N) if isinstance(v, Varying) else v)
 
         return SimpleNamespace(**{key: at(getattr(self, key, None)) for key in (*CONSTANTS, "axes")})
 
@@ -167,10 +167,10 @@ class Material:
 
     def _cells(self) -> Cells:
         """Return the cells of the material; raise ModelError if the material has not been assigned to cells."""
-        varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
-        if not varying_constants or varying_constants[0].cells is None:
+        varying = [v for name in CONSTANTS for v in varying_items(getattr(self, name, None))]
+        if not varying or varying[0].cells is None:
             raise ModelError("constants of the material depend on the position: add the material to a model first")
-        return varying_constants[0].cells
+        return varying[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
         """Raise ModelError, with the position, if constants are inadmissible in a cell; `names` are the varying constants."""
@@ -184,7 +184,7 @@ class Material:
             return
         point = int(wrong.argmax())
         values = {
-            name: mapped(getattr(constants, name), lambda v: float(np.broadcast_to(np.asarray(v), count)[point]))
+            name: map_constants(getattr(constants, name), lambda v: float(np.broadcast_to(np.asarray(v), count)[point]))
             for name in names
         }
         mesh, cell = self._cells().mesh, int(rows[point // len(N)])
@@ -201,7 +201,7 @@ class Material:
         columns of zz are zero (Timoshenko and Goodier, 1970, section 16). Raises ModelError if material axes or moduli depend
         on position.
         """
-        if callable(self.axes) or varying(self.axes) or self.graded:
+        if callable(self.axes) or varying_items(self.axes) or self.graded:
             raise ModelError(
                 "axes or constants of the material depend on the position: call moduli_at(points, kinematics, constants)"
             )
@@ -279,8 +279,8 @@ class Material:
 
     def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the material axes (n, 3, 3) [-] at `points` (n, dim) [length]; `constants` contains axes given by cell."""
-        axes = constants.axes if constants and varying(self.axes) else self.axes
-        if varying(axes):
+        axes = constants.axes if constants and varying_items(self.axes) else self.axes
+        if varying_items(axes):
             raise ModelError("axes given by cell need `constants`: pass `constants_at` of a model's material")
         return frames(axes, points, kinematics)
 
@@ -324,20 +324,20 @@ def check_positive(name: str, value: Any) -> None:
         raise ModelError(f"{name} is out of range: it must lie between {limits}, whatever its unit")
 
 
-def check_expansion(value: Any, most: int) -> None:
-    """Raise ModelError if a coefficient of expansion is given and is neither a finite number nor `most` finite numbers."""
+def check_expansion(value: Any, n_axes: int) -> None:
+    """Raise ModelError if a coefficient of expansion is given and is neither a finite number nor `n_axes` finite numbers."""
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) else list(value)
     valid = all(isinstance(v, Varying) or math.isfinite(_real(v)) for v in numbers)
-    if value is not None and not (valid and len(numbers) in (1, most)):
-        required = "a number" if most == 1 else "a number, or three along the material's axes"
+    if value is not None and not (valid and len(numbers) in (1, n_axes)):
+        required = "a number" if n_axes == 1 else "a number, or three along the material's axes"
         raise ModelError(f"the coefficient of thermal expansion = {value} must be {required}")
 
 
-def check_conductivity(value: Any, most: int) -> None:
-    """Raise ModelError if a conductivity is given and is neither a positive number nor `most` positive numbers."""
+def check_conductivity(value: Any, n_axes: int) -> None:
+    """Raise ModelError if a conductivity is given and is neither a positive number nor `n_axes` positive numbers."""
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str) else list(value)
-    if len(numbers) not in (1, most):
-        raise ModelError(f"the conductivity = {value} must be a number{', or three along the axes' * (most > 1)}")
+    if len(numbers) not in (1, n_axes):
+        raise ModelError(f"the conductivity = {value} must be a number{', or three along the axes' * (n_axes > 1)}")
     for number in numbers:
         if not (number is None or isinstance(number, Varying)):
             check_positive("the conductivity", number)
@@ -407,7 +407,7 @@ class LinearElastic(Material):
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "density", "expansion", "conductivity"):
-            object.__setattr__(self, name, wrapped(getattr(self, name)))
+            object.__setattr__(self, name, wrap_varying(getattr(self, name)))
         if not isinstance(self.E, Varying):
             check_positive("Young's modulus E", self.E)
         if not isinstance(self.nu, Varying) and not -1.0 < _real(self.nu) < 0.5:

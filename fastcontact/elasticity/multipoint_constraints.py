@@ -66,18 +66,18 @@ class TemporaryConstraint(MultiPointConstraint):
         """Return whether the constraint acts in the load step that begins at the instant `begin`."""
         return self.begins <= begin < self.ends
 
-    def after(self, reached: Array) -> list[MultiPointConstraint]:
+    def begun_constraints(self, initial_values: Array) -> list[MultiPointConstraint]:
         """Return the constraints that begin at the instant `begins`.
 
-        `reached` (m,) [length times the unit of the coefficients] contains the values of ``rows @ u`` at this instant.
+        `initial_values` (m,) [length times the unit of the coefficients] contains the values of ``rows @ u`` at this instant.
         """
         if self.keeps:
-            return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
-        value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
+            return [MultiPointConstraint(self.name, self.rows, initial_values, ((0.0, 1.0),))]
+        value, table = np.broadcast_to(self.value, initial_values.shape), self.ramp or ()
         later_points = [[(t, v * factor) for t, factor in table if t > self.begins] for v in value.tolist()]
         return [
             MultiPointConstraint(self.name, self.rows[[row]], 1.0, ((self.begins, start), *points))
-            for row, (start, points) in enumerate(zip(reached.tolist(), later_points, strict=True))
+            for row, (start, points) in enumerate(zip(initial_values.tolist(), later_points, strict=True))
         ]
 
 

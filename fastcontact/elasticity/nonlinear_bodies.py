@@ -106,10 +106,10 @@ class NonlinearBodies:
         return any(isinstance(law, ElasticPlastic) for law in self._materials)
 
     @property
-    def flows_freely(self) -> bool:
-        """Whether `change_if_halved` applies to the materials.
+    def halving_estimates_error(self) -> bool:
+        """Whether `change_if_halved` estimates the error of the plastic flow.
 
-        It does not apply in plane stress, where the out-of-plane strain changes the strain path when yielding begins.
+        It does not do so in plane stress, where the out-of-plane strain changes the strain path when yielding begins.
         """
         return self.yields and self.kinematics != "plane_stress"
 
@@ -119,7 +119,7 @@ class NonlinearBodies:
         return self.yields or self.kinematics == "plane_stress"
 
     @property
-    def beginning(self) -> History:
+    def initial_history(self) -> History:
         """The history before the first load step."""
         return {name: np.zeros((*numbers.shape, N_HISTORY)) for name, numbers in self._cells.items()}
 
@@ -144,7 +144,7 @@ class NonlinearBodies:
         return moduli, bulk
 
     def at(
-        self, displacement: Array, before: Mapping[str, Array], *, rise: Array | None = None, geometric: int = COMPLETE,
+        self, displacement: Array, old_history: Mapping[str, Array], *, rise: Array | None = None, geometric: int = COMPLETE,
         tangent: bool = True,
     ) -> DeformedBodies:  # fmt: skip
         """Return the response to a displacement, with internal forces, stresses, history and tangent.
@@ -153,7 +153,7 @@ class NonlinearBodies:
         ----------
         displacement : ndarray (n_points, dim)
             Displacements [length].
-        before : mapping of str to ndarray (n_cells, n_q, 9)
+        old_history : mapping of str to ndarray (n_cells, n_q, 9)
             History at the beginning of the load step, by solid element type.
         rise : ndarray (n_points,), optional
             Temperature rise above the reference temperature; zero by default [temperature].
@@ -173,17 +173,17 @@ class NonlinearBodies:
         data = np.zeros((0, *self._blocks[1:]))
         if tangent:
             data = np.zeros(self._blocks) if self.finite else self._elastic.copy()
-        return self._assembled(displacement, before, rise, geometric, data, not self.finite)
+        return self._response(displacement, old_history, rise, geometric, data, not self.finite)
 
     @cached_property
     def _elastic(self) -> Array:
         """Blocks (n_blocks, dim, dim) of the tangent without plastic flow at small strains [force / length]."""
         data = np.zeros(self._blocks)
-        self._assembled(np.zeros_like(self.mesh.points), self.beginning, None, COMPLETE, data, False)
+        self._response(np.zeros_like(self.mesh.points), self.initial_history, None, COMPLETE, data, False)
         return data
 
-    def _assembled(
-        self, displacement: Array, before: Mapping[str, Array], rise: Array | None, geometric: int, data: Array,
+    def _response(
+        self, displacement: Array, old_history: Mapping[str, Array], rise: Array | None, geometric: int, data: Array,
         elastic: bool,
     ) -> DeformedBodies:  # fmt: skip
         """Return the result of `at`, and add the tangent to `data` (n_blocks, dim, dim); see `body_kernels.linearise`."""
@@ -200,10 +200,10 @@ class NonlinearBodies:
             if (bulk[:, 1] > 0.0).any():  # because the remainder is not a linear function
                 polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
             owner, row_ranges = pattern.owners(mesh, name)
-            cauchy = np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
-            new = np.empty_like(before[name]) if self._has_history else before[name][:0]
+            cauchy = np.empty((*old_history[name].shape[:2], 6 if dim == 3 else 4))
+            new = np.empty_like(old_history[name]) if self._has_history else old_history[name][:0]
             energies, numbers = np.zeros((len(cells), 2)), self._cells[name]
-            slots, old = pattern.slots[name], before[name]
+            slots, old = pattern.slots[name], old_history[name]
 
             def linearise_part(number: int) -> tuple[int, int]:
                 rows = slice(*row_ranges[number])  # noqa: B023
@@ -217,19 +217,19 @@ class NonlinearBodies:
             for status, cell in parallel.parallel_map(linearise_part, range(len(row_ranges))):
                 if status:
                     raise ConvergenceError(self._failure(status, name, cell, displacement))
-            history[name], stress[name] = new if self._has_history else before[name], cauchy
+            history[name], stress[name] = new if self._has_history else old_history[name], cauchy
             energy += energies.sum(axis=0)
         size = mesh.n_points * dim
 
         def assembled_tangent() -> bsr_array:
             if not len(data):
-                return self.at(displacement, before, rise=rise, geometric=geometric).K
+                return self.at(displacement, old_history, rise=rise, geometric=geometric).K
             return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
         return DeformedBodies(assembled_tangent, force, history, stress, float(energy[0]), float(energy[1]))
 
     def change_if_halved(
-        self, middle: Array, end: Array, before: Mapping[str, Array], bodies: DeformedBodies
+        self, middle: Array, end: Array, old_history: Mapping[str, Array], bodies: DeformedBodies
     ) -> tuple[float, float]:
         """Return the norm of the stresses at points that yield in a step, and that of their change if the step is halved.
 
@@ -240,7 +240,7 @@ class NonlinearBodies:
         ----------
         middle, end : ndarray (n_points, dim)
             Displacements in the middle and at the end of the step [length].
-        before : mapping of str to ndarray (n_cells, n_q, 9)
+        old_history : mapping of str to ndarray (n_cells, n_q, 9)
             History at the beginning of the step, by solid element type.
         bodies : DeformedBodies
             The response at the end of the step.
@@ -250,16 +250,18 @@ class NonlinearBodies:
         size, change : float
             Both are zero if no point yields, or if a cell is inverted in the middle of the step [pressure].
         """
-        yields = {k: bodies.history[k][..., PLASTIC_STRAIN] > before[k][..., PLASTIC_STRAIN] for k in before}
-        if not any(points.any() for points in yields.values()):
+        yielding = {
+            k: bodies.history[k][..., PLASTIC_STRAIN] > old[..., PLASTIC_STRAIN] for k, old in old_history.items()
+        }
+        if not any(points.any() for points in yielding.values()):
             return 0.0, 0.0
         try:
-            halved_bodies = self.at(end, self.at(middle, before, tangent=False).history, tangent=False)
+            halved_bodies = self.at(end, self.at(middle, old_history, tangent=False).history, tangent=False)
         except ConvergenceError:
             return 0.0, 0.0
         twice_shear = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # in the norm of a tensor
         stress, halved_stress = (
-            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in yields.items()])
+            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in yielding.items()])
             for response in (bodies, halved_bodies)
         )
         return float(np.linalg.norm(stress)), float(np.linalg.norm(halved_stress - stress))
@@ -268,12 +270,12 @@ class NonlinearBodies:
         """Return the message for a nonzero status of `body_kernels.linearise`."""
         from fastcontact.elasticity import body_kernels
 
-        where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
+        centre = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
         J = np.linalg.det(self._deformation(name, slice(cell, cell + 1), displacement)).min()
         failure = f"is inverted (J = {J:.3g})"
         if status != body_kernels.INVERTED:
             failure = "has no out-of-plane strain for which the out-of-plane stress is zero"
-        return f"cell {cell} of {name} near {where} {failure}: try smaller load steps, or a coarser mesh at this point"
+        return f"cell {cell} of {name} near {centre} {failure}: try smaller load steps, or a coarser mesh at this point"
 
     def _deformation(self, name: str, rows: slice, displacement: Array) -> Array:
         """Return the deformation gradients (n, n_q, 3, 3) [-] of cells, with F_zz = 1 in plane stress."""

@@ -14,7 +14,7 @@ from fastcontact.elasticity.energy import gradients_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
-from fastcontact.elasticity.stiffness import LOOPS, of_cells
+from fastcontact.elasticity.stiffness import LOOPS, cell_materials
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -44,8 +44,8 @@ def interpolation(name: str, xi: Array) -> Array:
 
 def _varying_product(moduli: Array, name: str, xi: Array, material: Numbers, strain: Array) -> Array:
     """Return the product of moduli and strains at points `xi`; `material` (n_cells, n_q) refers to quadrature points."""
-    local = np.einsum("nq,cqij->cnij", interpolation(name, xi), moduli[material], optimize=True)
-    return np.asarray(np.einsum("cnij,cnj->cni", local, strain))
+    moduli_at_xi = np.einsum("nq,cqij->cnij", interpolation(name, xi), moduli[material], optimize=True)
+    return np.asarray(np.einsum("cnij,cnj->cni", moduli_at_xi, strain))
 
 
 class CellStress:
@@ -98,7 +98,7 @@ class CellStress:
             if split is not None:
                 from fastcontact.elasticity import dilatation_kernels
 
-                options = of_cells(numbers), self._axisymmetric, self._displacement
+                options = cell_materials(numbers), self._axisymmetric, self._displacement
                 bases = dilatation.basis(name, element.quadrature[0]), dilatation.basis(name, xi)
                 element_tables = *element.tables, bases[0], split.bulk
                 dilatation_kernels.add_pressure(points, nodes, *element_tables, *options, bases[1], stress)
@@ -143,9 +143,9 @@ class CellStress:
         numbers, offset_stress = material.reshape(len(cells), -1), np.empty((0, 0, 0))
         if self._offset is not None:
             quadrature_points = name, elements.get(name).quadrature[0], rows
-            strain = self._stress_free(self._offset, quadrature_points, cells, material)
+            strain = self._stress_free_strain(self._offset, quadrature_points, cells, material)
             offset_stress = (self._moduli[numbers] @ strain[..., None])[..., 0]
-            stress = self._offset.initial("stress", name, rows, elements.get(name).tables[0])
+            stress = self._offset.sum_of_states("stress", name, rows, elements.get(name).tables[0])
             offset_stress = offset_stress if stress is None else offset_stress - stress
         incompatible_modes_kernels.add_stress(
             self._mesh.points, cells, *incompatible_modes.tables(name), self._moduli, with_modes, numbers,
@@ -153,7 +153,7 @@ class CellStress:
         )  # fmt: skip
 
     @staticmethod
-    def _stress_free(
+    def _stress_free_strain(
         offset: StressOffset, location: tuple[str, Array, Indices], cells: Numbers, material: Numbers
     ) -> Array:
         """Return the sum of thermal and initial strains (n_cells, n, n_components) [-]."""
@@ -164,7 +164,7 @@ class CellStress:
         else:
             expansion = np.einsum("nq,cqi->cni", interpolation(name, xi), offset.expansion[material])
         strain = (offset.rise[cells] @ N.T)[:, :, None] * expansion
-        initial = offset.initial("strain", name, rows, N)
+        initial = offset.sum_of_states("strain", name, rows, N)
         return strain if initial is None else strain + initial
 
     def _add_offset(
@@ -172,10 +172,10 @@ class CellStress:
     ) -> None:
         """Add initial stresses, and subtract the stresses of the stress-free strains, whose dilatation is projected."""
         name, xi, rows = location
-        stress = offset.initial("stress", name, rows, elements.get(name).shape(xi))
+        stress = offset.sum_of_states("stress", name, rows, elements.get(name).shape(xi))
         if stress is not None:
             out += stress
-        strain = self._stress_free(offset, location, cells, material)
+        strain = self._stress_free_strain(offset, location, cells, material)
         split = dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
         if material.ndim == 1:
@@ -184,13 +184,13 @@ class CellStress:
             out -= _varying_product(moduli, name, xi, material, strain)
         if split is None:
             return
-        bulk = split.bulk[of_cells(material)]
-        split_cells = bulk[:, 0] != 0.0
-        at_points = name, elements.get(name).quadrature[0], rows[split_cells]
-        strain = self._stress_free(offset, at_points, cells[split_cells], material[split_cells])
-        corners = self._mesh.points[cells[split_cells]]
-        dilatations = dilatation.projected(name, corners, strain[:, :, :3].sum(axis=2), xi, self._axisymmetric)
-        out[split_cells, :, :3] -= (bulk[split_cells][:, :, None] * dilatations).sum(axis=1)[:, :, None]
+        bulk = split.bulk[cell_materials(material)]
+        is_split = bulk[:, 0] != 0.0
+        at_points = name, elements.get(name).quadrature[0], rows[is_split]
+        strain = self._stress_free_strain(offset, at_points, cells[is_split], material[is_split])
+        coordinates = self._mesh.points[cells[is_split]]
+        dilatations = dilatation.projected(name, coordinates, strain[:, :, :3].sum(axis=2), xi, self._axisymmetric)
+        out[is_split, :, :3] -= (bulk[is_split][:, :, None] * dilatations).sum(axis=1)[:, :, None]
 
 
 @typed(ModelError)
@@ -333,10 +333,10 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
         N, dN, weights = elements.get(name).tables
         for first in range(0, len(stress), CELLS_AT_ONCE):
             cells = mesh.cells[name][first : first + CELLS_AT_ONCE]
-            corners, (gradient, volume) = mesh.points[cells], gradients_at(mesh.points[cells], dN)
+            coordinates, (gradient, volume) = mesh.points[cells], gradients_at(mesh.points[cells], dN)
             weighted = (volume * weights)[..., None] * stress[first : first + CELLS_AT_ONCE]
             if axisymmetric:
-                radius = np.einsum("qa,ca->cq", N, corners[..., 0])
+                radius = np.einsum("qa,ca->cq", N, coordinates[..., 0])
                 weighted *= 2.0 * np.pi * radius[..., None]
             nodal = np.einsum("cqaj,cqij->cai", gradient, weighted[..., PAIRS[mesh.dim]], optimize=True)
             if axisymmetric:
@@ -352,7 +352,7 @@ def von_mises(stress: Array) -> Array:
 
     The components are xx, yy, zz, xy, in 3D also yz, xz.
     """
-    stress = _with_components(stress)
+    stress = _checked_components(stress)
     xx, yy, zz = stress[..., 0], stress[..., 1], stress[..., 2]
     shear = (stress[..., 3:] ** 2).sum(axis=-1)
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * shear)
@@ -364,7 +364,7 @@ def principal_stress(stress: Array) -> Array:
 
     The components are xx, yy, zz, xy, in 3D also yz, xz.
     """
-    stress = _with_components(stress)
+    stress = _checked_components(stress)
     six_components = np.concatenate([stress, np.zeros((*stress.shape[:-1], 6 - stress.shape[-1]))], axis=-1)
     return np.asarray(np.linalg.eigvalsh(six_components[..., PAIRS[3]]))
 
@@ -378,7 +378,7 @@ def tresca(stress: Array) -> Array:
     return np.asarray(np.ptp(principal_stress(stress), axis=-1))
 
 
-def _with_components(stress: Array) -> Array:
+def _checked_components(stress: Array) -> Array:
     """Return stresses or strains (..., n_components) as an array; ModelError unless they have four or six components."""
     stress = np.asarray(stress, float)
     if stress.shape[-1:] not in ((4,), (6,)):
@@ -395,7 +395,7 @@ def equivalent_strain(strain: Array) -> Array:
     For isotropic linear elastic materials, it is the von Mises stress divided by 3 G. The components are xx, yy, zz and the
     engineering shear strain xy, in 3D also the engineering shear strains yz and xz.
     """
-    strain = _with_components(strain)
+    strain = _checked_components(strain)
     tensor = strain * np.array([1.0] * 3 + [0.5] * (strain.shape[-1] - 3))
     return np.asarray(2.0 / 3.0 * von_mises(tensor))
 
@@ -407,6 +407,6 @@ def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
     The argument `equivalent` (...) [pressure] is the von Mises stress of `stress` (..., n_components) [pressure]. It is
     computed if it is not given.
     """
-    stress = _with_components(stress)
+    stress = _checked_components(stress)
     trace = stress[..., 0] + stress[..., 1] + stress[..., 2]
     return np.where(trace < 0, -1.0, 1.0) * (von_mises(stress) if equivalent is None else equivalent)

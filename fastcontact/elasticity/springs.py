@@ -50,38 +50,39 @@ class Springs:
         return self.stiffness * (self.rows @ displacement.ravel())
 
 
-def grounded(
+def ground_springs(
     name: str, nodes: AnyArray, stiffness: Mapping[int, float], n_dofs: int, dim: int,
-    along: Mapping[str, float] | None = None, direction: Array | None = None,
+    line_stiffness: Mapping[str, float] | None = None, direction: Array | None = None,
 ) -> Springs:  # fmt: skip
-    """Return springs from each of the `nodes` (n,) to the ground; see `joined`.
+    """Return springs from each of the `nodes` (n,) to the ground.
 
     A spring with the stiffness ``stiffness[axis]`` [force / length] acts along each axis in `stiffness`. Springs with the
-    stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act parallel and perpendicular to the unit
-    vector `direction` (dim,) [-].
+    stiffnesses ``line_stiffness["axial"]`` and ``line_stiffness["transverse"]`` [force / length] act parallel and
+    perpendicular to the unit vector `direction` (dim,) [-].
     """
-    directions, values = _directions(stiffness, along or {}, direction, dim)
+    directions, values = _directions(stiffness, line_stiffness or {}, direction, dim)
     rows = nodal_rows(np.tile(nodes, len(values))[:, None], np.repeat(directions, len(nodes), axis=0)[:, None], n_dofs)
     return Springs(name, rows, np.repeat(values, len(nodes)), True)
 
 
-def joined(
+def connecting_springs(
     name: str, points: Array, ends: tuple[AnyArray, AnyArray], stiffness: Mapping[int, float],
-    along: Mapping[str, float], direction: Array | None = None,
+    line_stiffness: Mapping[str, float], direction: Array | None = None,
 ) -> Springs:  # fmt: skip
     """Return springs between pairs of the `points` (n_points, dim) [length].
 
     The two arrays `ends` (n,) of int contain the first and the second points of the pairs. Springs act along each axis in
-    `stiffness` [force / length]. Springs with the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length]
-    act parallel and perpendicular to the line of a pair, or to the unit vector `direction` (dim,) [-]. Raises ModelError if
-    the points of a pair are identical, or if they coincide and the line between them is needed.
+    `stiffness` [force / length]. Springs with the stiffnesses ``line_stiffness["axial"]`` and
+    ``line_stiffness["transverse"]`` [force / length] act parallel and perpendicular to the line of a pair, or to the unit
+    vector `direction` (dim,) [-]. Raises ModelError if the points of a pair are identical, or if they coincide and the line
+    between them is needed.
     """
     rows, values = [], []
     for first, second in np.transpose(ends).tolist():
         if first == second:
             raise ModelError(f"{name}: both ends are point {first}; a spring to the ground has no second node")
-        axial = _line(name, points, first, second) if along and direction is None else direction
-        directions, k = _directions(stiffness, along, axial, points.shape[1])
+        axial = _line(name, points, first, second) if line_stiffness and direction is None else direction
+        directions, k = _directions(stiffness, line_stiffness, axial, points.shape[1])
         ends_of_rows = np.tile([first, second], (len(k), 1))
         rows.append(nodal_rows(ends_of_rows, np.stack([-directions, directions], axis=1), points.size))
         values.append(k)
@@ -101,7 +102,7 @@ def _line(name: str, points: Array, first: int, second: int) -> Array:
 
 
 def _directions(
-    stiffness: Mapping[int, float], along: Mapping[str, float], direction: Array | None, dim: int
+    stiffness: Mapping[int, float], line_stiffness: Mapping[str, float], direction: Array | None, dim: int
 ) -> tuple[Array, Array]:
     """Return the directions (m, dim) in which springs act, and their stiffness (m,) [force / length]."""
     directions = [np.eye(dim)[axis] for axis in stiffness]
@@ -109,8 +110,8 @@ def _directions(
     if direction is not None:
         basis = np.vstack([direction, np.linalg.svd(direction[None])[2][1:]])  # the unit vector and its normals
         kinds = ["axial", *["transverse"] * (dim - 1)]
-        directions += [vector for vector, kind in zip(basis, kinds, strict=True) if kind in along]
-        values += [along[kind] for kind in kinds if kind in along]
+        directions += [vector for vector, kind in zip(basis, kinds, strict=True) if kind in line_stiffness]
+        values += [line_stiffness[kind] for kind in kinds if kind in line_stiffness]
     return np.array(directions), np.array(values, float)
 
 
@@ -153,7 +154,7 @@ def stiffness_warnings(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
     ModelError
         If a ratio of stiffnesses exceeds ERROR_RATIO, so that about four digits or fewer would remain.
     """
-    dim, texts = K.blocksize[0], []
+    dim, warnings = K.blocksize[0], []
     for spring in springs:
         ratio, body = _stiffness_ratio(spring, K.diagonal(), dim)
         if ratio <= WARNING_RATIO:
@@ -161,15 +162,15 @@ def stiffness_warnings(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
         text = f"{spring.name} is {ratio:.1e} times as stiff as the body at one of its ends ({body:.3g})"
         softer = 0.1 * WARNING_RATIO * body
         remedy = f"use {softer:.0e} or less, or a multi-point constraint (relate, relate_groups), which is exact"
-        lost = round(math.log10(ratio))
+        n_lost = round(math.log10(ratio))
         if ratio > ERROR_RATIO:
-            left = "no correct digit" if lost >= DIGITS else f"only {DIGITS - lost} of {DIGITS} correct digits"
-            raise ModelError(f"{text}: results would have {left}; {remedy}")
-        texts.append(
-            f"{text}: results lose up to {lost} of {DIGITS} digits, and with contact its force is accurate only to this "
+            remaining = "no correct digit" if n_lost >= DIGITS else f"only {DIGITS - n_lost} of {DIGITS} correct digits"
+            raise ModelError(f"{text}: results would have {remaining}; {remedy}")
+        warnings.append(
+            f"{text}: results lose up to {n_lost} of {DIGITS} digits, and with contact its force is accurate only to this "
             f"ratio times the convergence criteria; {remedy}"
         )
-    return texts
+    return warnings
 
 
 def _stiffness_ratio(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:

@@ -136,10 +136,10 @@ def stiffness(
             axisymmetric=kinematics == "axisymmetric", pattern=pattern, data=data,
         )  # fmt: skip
         bad_cells = parallel.parallel_map(add_part, range(len(pattern.owners(mesh, name).cells)))
-        bad = min((number for number in bad_cells if number >= 0), default=-1)
-        if bad >= 0:
-            where = mesh.points[block[bad]].mean(axis=0)
-            raise MeshError(f"cell {bad} of {name} near {where} is degenerate or inverted (Jacobian not positive)")
+        bad_cell = min((number for number in bad_cells if number >= 0), default=-1)
+        if bad_cell >= 0:
+            x = mesh.points[block[bad_cell]].mean(axis=0)
+            raise MeshError(f"cell {bad_cell} of {name} near {x} is degenerate or inverted (Jacobian not positive)")
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
@@ -160,7 +160,7 @@ def is_isotropic(moduli: Array) -> Mask:
     return np.asarray(np.abs(moduli - isotropic).max(axis=(1, 2)) <= 1e-14 * np.abs(moduli[:, 0, 0]))
 
 
-def of_cells(material: Numbers) -> Numbers:
+def cell_materials(material: Numbers) -> Numbers:
     """Return one material number for each cell (n_cells,).
 
     If `material` (n_cells,) contains numbers of cells, it is returned unchanged. If it contains numbers of quadrature points
@@ -197,11 +197,11 @@ def _add_part(
     cells, material, slots = mesh.cells[name][rows], material[rows], pattern.slots[name][rows]
     target = axisymmetric, slots, owner, number, data
     for tables_of_pass, numbers in _passes(tables, material):
-        bad = LOOPS[mesh.dim].add_stiffness(
+        bad_cell = LOOPS[mesh.dim].add_stiffness(
             mesh.points, cells, *tables_of_pass, D if split is None else split.moduli, isotropic, numbers, *target
         )
-        if bad >= 0:
-            return int(bad) + rows.start
+        if bad_cell >= 0:
+            return int(bad_cell) + rows.start
     if with_modes is not None:
         from fastcontact.elasticity import incompatible_modes_kernels
 
@@ -212,8 +212,8 @@ def _add_part(
     if split is not None:
         from fastcontact.elasticity import dilatation_kernels
 
-        basis = dilatation.basis(name, elements.get(name).quadrature[0])
-        dilatation_kernels.add_stiffness(mesh.points, cells, *tables, basis, split.bulk, of_cells(material), *target)
+        integrands = *tables, dilatation.basis(name, elements.get(name).quadrature[0]), split.bulk
+        dilatation_kernels.add_stiffness(mesh.points, cells, *integrands, cell_materials(material), *target)
     return -1
 
 

@@ -56,7 +56,7 @@ class Temperature:
         return f"the temperature of {listed(self.groups)}"
 
     @property
-    def places(self) -> tuple[str, ...]:
+    def group_names(self) -> tuple[str, ...]:
         """Names of the groups."""
         return (EVERYWHERE,) if self.groups is None else self.groups
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numba.extending
 
-from fastcontact._jit.decorators import compiled
+from fastcontact._jit.decorators import jit_enabled
 
 
 def tile_plain(
@@ -82,4 +82,4 @@ def tile_in_vectors(
     return types.none(*arguments), code
 
 
-tile = numba.extending.intrinsic(tile_in_vectors) if compiled() else tile_plain
+tile = numba.extending.intrinsic(tile_in_vectors) if jit_enabled() else tile_plain

@@ -116,7 +116,7 @@ class Varying:
 
     Parameters
     ----------
-    given : callable or ndarray
+    source : callable or ndarray
         A function from positions (n, dim) [length] to numbers (n,), or an array with a number for each cell or point.
     cells : Cells, optional
         Cells of the material; None before the material is assigned to cells.
@@ -124,21 +124,21 @@ class Varying:
         Name of the constant in messages.
     """
 
-    def __init__(self, given: Any, cells: Cells | None = None, name: str = "the constant") -> None:
-        self.given, self.cells, self._name = given, cells, name
+    def __init__(self, source: Any, cells: Cells | None = None, name: str = "the constant") -> None:
+        self.source, self.cells, self._name = source, cells, name
         self._nodal: Array | None = None
         self._by_cell: dict[str, Array] | None = None
-        if cells is not None and not callable(given):
-            self._assign(np.asarray(given), cells)
+        if cells is not None and not callable(source):
+            self._assign(np.asarray(source), cells)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Varying) and self.given is other.given
+        return isinstance(other, Varying) and self.source is other.source
 
     def __hash__(self) -> int:
-        return id(self.given)
+        return id(self.source)
 
     def __repr__(self) -> str:
-        return "a function of the position" if callable(self.given) else f"an array of {len(self.given)} numbers"
+        return "a function of the position" if callable(self.source) else f"an array of {len(self.source)} numbers"
 
     def __format__(self, spec: str) -> str:
         if self.cells is None:
@@ -198,7 +198,7 @@ class Varying:
         nodes = mesh.cells[name][rows]
         if self._nodal is not None:
             return (self._nodal[nodes] @ N.T).ravel()
-        return evaluated(self.given, positions(mesh, nodes, N), self._name).ravel()
+        return evaluated(self.source, positions(mesh, nodes, N), self._name).ravel()
 
 
 class CellAxes(Varying):
@@ -243,14 +243,14 @@ def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
     return np.einsum("qa,cad->cqd", N, mesh.points[nodes]).reshape(-1, mesh.dim)
 
 
-def wrapped(value: Any, vector: bool = False) -> Any:
+def wrap_varying(value: Any, vector: bool = False) -> Any:
     """Return functions and arrays as `Varying`, and numbers and None unchanged.
 
     If `vector` is true, a sequence of constants is converted item by item. Raises ModelError if an array does not contain
     real numbers.
     """
     if vector and isinstance(value, Sequence) and not isinstance(value, str):
-        return tuple(wrapped(v) for v in value)
+        return tuple(wrap_varying(v) for v in value)
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
         return float(value)
     if isinstance(value, list | tuple):
@@ -267,11 +267,11 @@ def wrapped(value: Any, vector: bool = False) -> Any:
     return Varying(value)
 
 
-def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
+def map_constants(value: Any, function: Callable[[Any], Any]) -> Any:
     """Apply `function` to a constant, or to each item of a tuple of constants."""
     return tuple(function(v) for v in value) if isinstance(value, tuple) else function(value)
 
 
-def varying(value: Any) -> list[Varying]:
+def varying_items(value: Any) -> list[Varying]:
     """Return, from a constant or a tuple of constants, those that vary with position."""
     return [v for v in (value if isinstance(value, tuple) else (value,)) if isinstance(v, Varying)]

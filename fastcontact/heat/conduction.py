@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
-from fastcontact.elasticity.mass import assembled, portions
+from fastcontact.elasticity.mass import assembled, cell_portions
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.varying_constants import positions
 from fastcontact.errors import ModelError
@@ -59,24 +59,24 @@ class Conduction:
         The quadrature is exact for constant conductivities in cells that are affine images of the reference cell.
         """
 
-        def local(name: str, rows: Indices) -> Array:
-            gradient, k, volume = self._at(name, rows)
+        def cell_matrices(name: str, rows: Indices) -> Array:
+            gradient, k, volume = self._integrands(name, rows)
             return np.einsum("cq,cqai,cqij,cqbj->cab", volume, gradient, k, gradient, optimize=True)[..., None]
 
-        pattern, values = assembled(self.mesh, local)
+        pattern, values = assembled(self.mesh, cell_matrices)
         return csr_array((values[:, 0], pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
 
     def flux(self, temperature: Array) -> Array:
         """Return the mean heat flux (n_solids, dim) [power / area] in cells for a `temperature` (n_points,) [temperature]."""
         flux = []
-        for name, rows in portions(self.mesh):
-            gradient, k, volume = self._at(name, rows)
+        for name, rows in cell_portions(self.mesh):
+            gradient, k, volume = self._integrands(name, rows)
             temperature_gradient = np.einsum("cqai,ca->cqi", gradient, temperature[self.mesh.cells[name][rows]])
             integral = -np.einsum("cq,cqij,cqj->ci", volume, k, temperature_gradient, optimize=True)
             flux.append(integral / volume.sum(axis=1)[:, None])
         return np.concatenate(flux)
 
-    def _at(self, name: str, rows: Indices) -> tuple[Array, Array, Array]:
+    def _integrands(self, name: str, rows: Indices) -> tuple[Array, Array, Array]:
         """Return the gradients of shape functions, the conductivities and the volumes at the quadrature points of cells.
 
         Their shapes are (c, q, n, dim) [1 / length], (c, q, dim, dim) [power / (length temperature)] and (c, q) [volume].

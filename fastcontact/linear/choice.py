@@ -12,27 +12,27 @@ import pkgutil
 
 from fastcontact.errors import ModelError, unknown
 from fastcontact.linear import solvers
-from fastcontact.linear.factor_solver import AFFORDABLE
+from fastcontact.linear.factor_solver import MAX_FACTORISED_DOFS
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 
 log = logging.getLogger("fastcontact")
 # For each solver that needs an optional package, the name of the package and of the extra of fastcontact that installs it.
 PACKAGES = {"cholmod": ("kvxopt", "cholmod")}
-KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
-SOLVERS = tuple(name for name in KNOWN if name not in PACKAGES or importlib.util.find_spec(PACKAGES[name][0]))
+SOLVER_NAMES = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
+SOLVERS = tuple(name for name in SOLVER_NAMES if name not in PACKAGES or importlib.util.find_spec(PACKAGES[name][0]))
 # Largest admissible relative residual.
 MAX_TOLERANCE = 1e-3
 # Number of unknowns, by dimension, above which a solution by multigrid is cheaper than a factorisation (measured, see
-# bench/README.md). If constraints require columns of K^-1, the limit is AFFORDABLE, because multigrid solves one linear
-# system for each column.
-DIRECT_UP_TO = {2: AFFORDABLE[2], 3: 15_000}
+# bench/README.md). If constraints require columns of K^-1, the limit is MAX_FACTORISED_DOFS, because multigrid solves one
+# linear system for each column.
+MAX_DIRECT_DOFS = {2: MAX_FACTORISED_DOFS[2], 3: 15_000}
 # The same limit in 3D for quadratic cells, with which multigrid takes about ten times as many iterations.
-QUADRATIC_UP_TO = 50_000
+MAX_DIRECT_DOFS_QUADRATIC = 50_000
 
 
 def make(
-    name: str, *, dim: int, n_dofs: int, tolerance: float = TOLERANCE, precision: str | None = None, columns: bool = False,
-    quadratic: bool = False,
+    name: str, *, dim: int, n_dofs: int, tolerance: float = TOLERANCE, precision: str | None = None,
+    needs_columns: bool = False, has_quadratic_cells: bool = False,
 ) -> LinearSolver:  # fmt: skip
     """Return a linear solver by name.
 
@@ -50,10 +50,10 @@ def make(
         Relative residual at which iterative solvers stop; at most 0.001.
     precision : {"single", "double"}, optional
         Precision of the multigrid cycle, single by default. Direct solvers always use double precision.
-    columns : bool
+    needs_columns : bool
         Whether there are constraints that cannot be eliminated and require columns of ``K^-1``, such as those with a full
         compliance matrix; for the choice by ``"auto"``.
-    quadratic : bool
+    has_quadratic_cells : bool
         Whether there are quadratic cells in linear bodies; for the choice by ``"auto"``.
 
     Raises
@@ -64,7 +64,7 @@ def make(
     check_solver(name)
     check_tolerance(tolerance)
     if name == "auto":
-        name, reason = chosen(dim, n_dofs, columns, quadratic)
+        name, reason = automatic_choice(dim, n_dofs, needs_columns, has_quadratic_cells)
         log.info("linear solver: %s, %s", name, reason)
     options = {} if precision is None or name != "amg" else {"precision": precision}
     solver: LinearSolver = importlib.import_module(f"{solvers.__name__}.{name}").SOLVER(tolerance, **options)
@@ -94,10 +94,10 @@ def limited_tolerance(tolerance: float, relative: float) -> float:
     return min(tolerance, relative)
 
 
-def chosen(dim: int, n_dofs: int, columns: bool = False, quadratic: bool = False) -> tuple[str, str]:
+def automatic_choice(dim: int, n_dofs: int, needs_columns: bool, has_quadratic_cells: bool) -> tuple[str, str]:
     """Return the name of the solver that ``"auto"`` selects, and the reason for it; for parameters see `make`."""
-    limit = (AFFORDABLE if columns else DIRECT_UP_TO)[dim]
-    limit = max(limit, QUADRATIC_UP_TO) if quadratic and dim == 3 else limit
+    limit = (MAX_FACTORISED_DOFS if needs_columns else MAX_DIRECT_DOFS)[dim]
+    limit = max(limit, MAX_DIRECT_DOFS_QUADRATIC) if has_quadratic_cells and dim == 3 else limit
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"
     return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation costs more than multigrid (above {limit})"

@@ -25,7 +25,7 @@ from fastcontact.linear.field_compliance import FieldCompliance
 # Largest number of constraints whose Delassus operator is formed and factorised. A matrix with 20 000 rows occupies 3.2 GB,
 # and its factorisation takes minutes. With friction, Newton's method factorises a nonsymmetric matrix several times for each
 # pairing. With 6 000 rows, one factorisation takes ten seconds.
-MOST_ROWS, MOST_ROWS_WITH_FRICTION = 20_000, 6_000
+MAX_ROWS, MAX_ROWS_WITH_FRICTION = 20_000, 6_000
 # Options of a contact pair whose constraints can be eliminated, so that the Delassus operator is not formed.
 ELIMINABLE = 'formulation="mortar" with multipliers="dual"'
 
@@ -47,9 +47,9 @@ def check_rows(count: int, limit: int | None = None) -> None:
     Raises
     ------
     ContactError
-        If `count` exceeds `limit`, by default MOST_ROWS.
+        If `count` exceeds `limit`, by default MAX_ROWS.
     """
-    limit = MOST_ROWS if limit is None else limit
+    limit = MAX_ROWS if limit is None else limit
     if count > limit:
         raise ContactError(
             f"the contact needs the full compliance of {count} constraints, a matrix of {8e-9 * count**2:.1f} GB that is "
@@ -73,7 +73,7 @@ class InverseColumns:
 
     Attributes
     ----------
-    asked : list of ndarray of int
+    requests : list of ndarray of int
         Degrees of freedom of each request. The order of the requests matters, because round-off and the errors of iterative
         solutions depend on it.
     """
@@ -95,19 +95,19 @@ class InverseColumns:
         self._dofs, self._values = dofs, values
         self._position[dofs] = np.arange(len(dofs))
 
-    def of_rows(self, R: csr_array) -> Array:
+    def delassus(self, R: csr_array) -> Array:
         """Return ``R K^-1 R.T`` (m, m) [length / force] for a sparse matrix R (m, n)."""
         check_rows(R.shape[0])
         nonzero = R.data != 0.0
         column = self._positions(R.indices[nonzero])
         starts = np.concatenate([[0], np.cumsum(nonzero)])[R.indptr]
         rows = csr_array((R.data[nonzero], column, starts), shape=(R.shape[0], len(self._dofs)))
-        return symmetric(np.asarray(rows @ (rows @ self._values).T))
+        return symmetric_part(np.asarray(rows @ (rows @ self._values).T))
 
     def put_back(self, requests: Sequence[Indices]) -> None:
         """Restore the state after the given `requests`, in this order; solve only for columns that are not stored."""
         pairs = zip(self.requests, requests, strict=False)
-        n_equal = next((i for i, (old, new) in enumerate(pairs) if not np.array_equal(old, new)), len(requests))
+        n_equal = next((i for i, pair in enumerate(pairs) if not np.array_equal(*pair)), len(requests))
         if n_discarded := sum(len(dofs) for dofs in self.requests[n_equal:]):
             self._position[self._dofs[-n_discarded:]] = -1
             self._dofs = self._dofs[:-n_discarded]
@@ -121,25 +121,25 @@ class InverseColumns:
 
         A degree of freedom may occur more than once in `dofs`.
         """
-        new = np.unique(dofs[self._position[dofs] < 0]).astype(np.intp)
-        if len(new):
-            self._extend(new)
+        new_dofs = np.unique(dofs[self._position[dofs] < 0]).astype(np.intp)
+        if len(new_dofs):
+            self._extend(new_dofs)
         return self._position[dofs]
 
-    def _extend(self, new: Indices) -> None:
-        """Compute the columns of the degrees of freedom `new` (k,), and store them."""
-        old = len(self._dofs)
-        if old + len(new) > self._limit:
-            raise TooManyColumnsError(old + len(new))
-        self.requests.append(new)
-        self._dofs = np.concatenate([self._dofs, new])
-        self._position[new] = np.arange(old, len(self._dofs))
+    def _extend(self, new_dofs: Indices) -> None:
+        """Compute the columns of the degrees of freedom `new_dofs` (k,), and store them."""
+        n_old = len(self._dofs)
+        if n_old + len(new_dofs) > self._limit:
+            raise TooManyColumnsError(n_old + len(new_dofs))
+        self.requests.append(new_dofs)
+        self._dofs = np.concatenate([self._dofs, new_dofs])
+        self._position[new_dofs] = np.arange(n_old, len(self._dofs))
         entries = self._entries()
         assert entries is not None, "the solver of these columns no longer exists"
         extended = np.empty((len(self._dofs), len(self._dofs)))
-        extended[:old, :old] = self._values
-        extended[:, old:] = entries(self._dofs, new)
-        extended[old:, :old] = extended[:old, old:].T
+        extended[:n_old, :n_old] = self._values
+        extended[:, n_old:] = entries(self._dofs, new_dofs)
+        extended[n_old:, :n_old] = extended[:n_old, n_old:].T
         self._values = extended
 
 
@@ -170,13 +170,13 @@ def lu_solver(A: Array) -> Callable[[Array], Array]:
     return lambda right_side: dgetrs(lu, pivots, right_side)[0]
 
 
-def symmetric(delassus: Array) -> Array:
+def symmetric_part(delassus: Array) -> Array:
     """Return the symmetric part of a matrix (m, m)."""
     return 0.5 * (delassus + delassus.T)
 
 
-def solve_multipliers(delassus: Array, right: Array, C: Array | FieldCompliance | None) -> Array:
-    """Return the multipliers with ``(delassus + C) multiplier = right``.
+def solve_multipliers(delassus: Array, rhs: Array, C: Array | FieldCompliance | None) -> Array:
+    """Return the multipliers with ``(delassus + C) multiplier = rhs``.
 
     If the matrix is singular up to round-off, the least-squares solution of minimum norm is returned.
 
@@ -184,7 +184,7 @@ def solve_multipliers(delassus: Array, right: Array, C: Array | FieldCompliance 
     ----------
     delassus : ndarray (m, m)
         Delassus operator; it is overwritten [length / force].
-    right : ndarray (m,)
+    rhs : ndarray (m,)
         Right-hand side [length].
     C : ndarray (m, m) or (m,) or FieldCompliance, optional
         Compliance of the constraints, or the diagonal of a diagonal compliance matrix [length / force].
@@ -205,8 +205,8 @@ def solve_multipliers(delassus: Array, right: Array, C: Array | FieldCompliance 
         pass
     else:
         if not (factor[0].diagonal() ** 2 <= _round_off(delassus) * delassus.diagonal()).any():
-            return cho_solve(factor, right)
-    return np.asarray(lstsq(delassus, right, cond=_round_off(delassus))[0])
+            return cho_solve(factor, rhs)
+    return np.asarray(lstsq(delassus, rhs, cond=_round_off(delassus))[0])
 
 
 def _round_off(delassus: Array) -> float:

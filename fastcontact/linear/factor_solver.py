@@ -15,7 +15,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
-from fastcontact.linear.delassus import InverseColumns, check_rows, solve_multipliers, symmetric
+from fastcontact.linear.delassus import InverseColumns, check_rows, solve_multipliers, symmetric_part
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import Counters, LinearSolver, Loaded, Monitor
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
@@ -25,7 +25,7 @@ log = logging.getLogger("fastcontact")
 # than it saves.
 MAX_LAST_UNKNOWNS = 4000
 # Largest number of unknowns for which a factorisation is affordable, by dimension.
-AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
+MAX_FACTORISED_DOFS = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 # Relative residual that direct solutions attain.
 ATTAINABLE_RESIDUAL = ROUND_OFF / 100
 # Number of right-hand sides that are stored. Loads and supports seldom have more independent ramps.
@@ -179,11 +179,11 @@ class FactorSolver(LinearSolver):
 class LoadedFactor(Loaded):
     """The factors of a `FactorSolver` with a right-hand side f (n,); see `linear.protocol.Loaded`.
 
-    `free` (n,) is the solution without constraints [length].
+    `unconstrained` (n,) is the solution without constraints [length].
     """
 
-    def __init__(self, solver: FactorSolver, f: Array, free: Array) -> None:
-        self._solver, self._f, self._free = solver, f, free
+    def __init__(self, solver: FactorSolver, f: Array, unconstrained: Array) -> None:
+        self._solver, self._f, self._unconstrained = solver, f, unconstrained
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
@@ -191,58 +191,56 @@ class LoadedFactor(Loaded):
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
         if B.shape[0] == 0:
-            return self._free, np.empty(0)
-        multiplier = solve_multipliers(self._solver.columns.of_rows(B), c - B @ self._free, C)
+            return self._unconstrained, np.empty(0)
+        multiplier = solve_multipliers(self._solver.columns.delassus(B), c - B @ self._unconstrained, C)
         return self.involved_solution(B.T @ multiplier, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, self._solver.columns.of_rows(R)
+        return R @ self._unconstrained, self._solver.columns.delassus(R)
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
         if self._solver.refines:
             return self._solver.refined(self._f + force)
         if not force.any():
-            return self._free.copy()
+            return self._unconstrained.copy()
         last = self._solver.last
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
             return self._solver.back_substitute(self._f + force)
         self._solver.counters.iterations += 1
-        return self._free + self._solver.factors.harmonic_extension(self._solver.inverse @ force[last])
+        return self._unconstrained + self._solver.factors.harmonic_extension(self._solver.inverse @ force[last])
 
-    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+    def involved_solution(self, force: Array, estimate: Array | None) -> Array:
         """See `Loaded`."""
         last = self._solver.last
-        if elsewhere is None or last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
+        if estimate is None or last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
             return self.full_solution(force)
-        u = elsewhere.copy()
-        u[last] = self._free[last] + self._solver.inverse @ force[last]
+        u = estimate.copy()
+        u[last] = self._unconstrained[last] + self._solver.inverse @ force[last]
         return u
 
     def condensed(self) -> Loaded:
         """See `Loaded`."""
         last = self._solver.last
-        return self if last is None else CondensedProblem(self._solver.inverse, self._free[last])
+        return self if last is None else CondensedProblem(self._solver.inverse, self._unconstrained[last])
 
 
 class CondensedProblem(Loaded):
     """The system after static condensation to the k unknowns that may occur in constraint equations.
 
-    See `linear.protocol.Loaded`.
-
-    All vectors have the length k.
+    All vectors have the length k; see `linear.protocol.Loaded`.
 
     Parameters
     ----------
     inverse : ndarray (k, k)
         Block of ``K^-1`` for these unknowns, the inverse of the condensed matrix [length / force].
-    free : ndarray (k,)
+    unconstrained : ndarray (k,)
         Solution without constraints [length].
     """
 
-    def __init__(self, inverse: Array, free: Array) -> None:
-        self._inverse, self._free = inverse, free
+    def __init__(self, inverse: Array, unconstrained: Array) -> None:
+        self._inverse, self._unconstrained = inverse, unconstrained
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
@@ -250,16 +248,16 @@ class CondensedProblem(Loaded):
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
         if B.shape[0] == 0:
-            return self._free, np.empty(0)
+            return self._unconstrained, np.empty(0)
         check_rows(B.shape[0])
         B_inverse = B @ self._inverse
-        multiplier = solve_multipliers(symmetric(B @ B_inverse.T), c - B @ self._free, C)
-        return self._free + multiplier @ B_inverse, multiplier
+        multiplier = solve_multipliers(symmetric_part(B @ B_inverse.T), c - B @ self._unconstrained, C)
+        return self._unconstrained + multiplier @ B_inverse, multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, symmetric(R @ (R @ self._inverse).T)
+        return R @ self._unconstrained, symmetric_part(R @ (R @ self._inverse).T)
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
-        return np.asarray(self._free + self._inverse @ force)
+        return np.asarray(self._unconstrained + self._inverse @ force)

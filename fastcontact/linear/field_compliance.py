@@ -40,7 +40,7 @@ class FieldCompliance:
         Areas W of the points, which are positive [area].
     stiffness : ndarray (m,)
         Stiffness rho W of the springs [force / length].
-    others : csr_array (k, k)
+    E : csr_array (k, k)
         The matrix E.
     dense : callable
         Function without arguments that returns C (m, m) [length / force].
@@ -52,7 +52,7 @@ class FieldCompliance:
     P: csr_array
     weights: Array
     stiffness: Array
-    others: csr_array
+    E: csr_array
     dense: Callable[[], Array]
     bordered: bool = False
 
@@ -63,7 +63,7 @@ class FieldCompliance:
             csr_array(block_diag([compliance.P for compliance in compliances], format="csr")),
             np.concatenate([compliance.weights for compliance in compliances]),
             np.concatenate([compliance.stiffness for compliance in compliances]),
-            csr_array(block_diag([compliance.others for compliance in compliances], format="csr")),
+            csr_array(block_diag([compliance.E for compliance in compliances], format="csr")),
             dense,
             any(compliance.bordered for compliance in compliances),
         )
@@ -81,11 +81,11 @@ class FieldCompliance:
         """
         reduction = 1.0 / (1.0 + self.stiffness * softness)
         weights = self.weights * reduction
-        others = csr_array(self.others + self.P.T @ diags_array(self.weights * weights * softness) @ self.P)
-        others.eliminate_zeros()
-        return FieldCompliance(self.P, weights, self.stiffness * reduction, others, dense, self.bordered)
+        E = csr_array(self.E + self.P.T @ diags_array(self.weights * weights * softness) @ self.P)
+        E.eliminate_zeros()
+        return FieldCompliance(self.P, weights, self.stiffness * reduction, E, dense, self.bordered)
 
-    def of_field(self, B: csr_array, c: Array) -> FieldEquations:
+    def field_equations(self, B: csr_array, c: Array) -> FieldEquations:
         """Return the equivalent equations for the values of the field.
 
         B (m, n) and c (m,) are the matrix [-] and the right-hand sides [length] of the equations at the points.
@@ -94,41 +94,41 @@ class FieldCompliance:
         area = np.asarray(abs(PTW).sum(axis=1))
         values = np.flatnonzero(area > 0.0)  # numbers of the values that occur in the equations
         # Each equation is divided by the area of its value, which may be small at the edge of the contact.
-        units = 1.0 / area[values]
-        PTW = csr_array(diags_array(units) @ PTW[values])
-        edge = (self.others.diagonal()[values] > 0.0) | self.bordered
-        P = csr_array(self.P[:, values] @ diags_array(units))
-        compliance = self._at_edge(values[edge], units[edge])
-        return FieldEquations(csr_array(PTW @ B), PTW @ c, P, edge, compliance, values[edge], units[edge])
+        scales = 1.0 / area[values]
+        PTW = csr_array(diags_array(scales) @ PTW[values])
+        edge = (self.E.diagonal()[values] > 0.0) | self.bordered
+        P = csr_array(self.P[:, values] @ diags_array(scales))
+        compliance = self._edge_compliance(values[edge], scales[edge])
+        return FieldEquations(csr_array(PTW @ B), PTW @ c, P, edge, compliance, values[edge], scales[edge])
 
-    def _at_edge(self, values: Indices, units: Array) -> csr_array:
-        """Return E (e, e) for the values of the field with the numbers `values` (e,), scaled by `units` (e,).
+    def _edge_compliance(self, values: Indices, scales: Array) -> csr_array:
+        """Return E (e, e) for the values of the field with the numbers `values` (e,), scaled by `scales` (e,).
 
         Values that do not occur in any equation are eliminated from E.
         """
-        unused = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), values)
-        E = csr_array(self.others[values][:, values])
-        coupling = csr_array(self.others[values][:, unused])
+        unused = np.setdiff1d(np.flatnonzero(self.E.diagonal() > 0.0), values)
+        E = csr_array(self.E[values][:, values])
+        coupling = csr_array(self.E[values][:, unused])
         if coupling.nnz:
             coupled = np.flatnonzero(np.diff(coupling.indptr))
             rows = csr_array(coupling[coupled])
-            correction = rows @ splu(csc_array(self.others[unused][:, unused])).solve(rows.T.toarray())
+            correction = rows @ splu(csc_array(self.E[unused][:, unused])).solve(rows.T.toarray())
             n = len(coupled)
             selection = csr_array((np.ones(n), (coupled, np.arange(n))), (len(values), n))
             E = csr_array(E - selection @ csr_array(correction) @ selection.T)
-        scaling = diags_array(units)
+        scaling = diags_array(scales)
         return csr_array(scaling @ E @ scaling)
 
 
 @dataclass(frozen=True, eq=False)
 class FieldEquations:
-    """Equations ``rows u + E p = right`` for those values p (l,) of a field that occur in the equations at points.
+    """Equations ``rows u + E p = rhs`` for those values p (l,) of a field that occur in the equations at points.
 
     Attributes
     ----------
     rows : csr_array (l, n)
         Matrix of the equations [-].
-    right : ndarray (l,)
+    rhs : ndarray (l,)
         Right-hand sides [length].
     P : csr_array (m, l)
         Map from the values p to the pressures at the points.
@@ -139,14 +139,14 @@ class FieldEquations:
         The matrix E for the values that are not eliminated.
     edge_values : ndarray of int (e,)
         Numbers of these values in the field.
-    units : ndarray (e,)
+    scales : ndarray (e,)
         Scaling factors of these values.
     """
 
     rows: csr_array
-    right: Array
+    rhs: Array
     P: csr_array
     edge: Mask
     compliance: csr_array
     edge_values: Indices
-    units: Array
+    scales: Array

@@ -101,11 +101,11 @@ class Loaded(Protocol):
         `u` (n,) is the result of `solve` with the same forces, if available [length].
         """
 
-    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+    def involved_solution(self, force: Array, estimate: Array | None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) [length], valid only at the `involved` unknowns of `LinearSolver.prepare`.
 
-        If `elsewhere` (n,) is given, a solver for which the other unknowns require additional work copies them from
-        `elsewhere`. Likewise, `solve` copies them from its `guess`.
+        If an `estimate` (n,) of the solution is given, a solver for which the other unknowns require additional work copies
+        them from `estimate`. Likewise, `solve` copies them from its `guess`.
         """
         return self.full_solution(force)
 
@@ -244,7 +244,7 @@ class LinearSolver(Protocol):
             K, or the object that replaces it in products.
         """
 
-    def near(self) -> Self:
+    def copy_for_similar_matrix(self) -> Self:
         """Return a copy of the solver, to be prepared for a similar matrix with the same pattern, such as a tangent."""
         return copy.copy(self)
 

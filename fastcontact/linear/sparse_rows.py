@@ -15,8 +15,8 @@ from fastcontact.arrays import AnyArray, Array, Indices
 Blocks = tuple[NDArray[np.integer], NDArray[np.integer], Array]
 
 
-def assembled(blocks: Sequence[Blocks], size: tuple[int, int]) -> csr_array:
-    """Return the matrix of shape `size` that is the sum of dense blocks; zeros are not stored."""
+def assembled(blocks: Sequence[Blocks], shape: tuple[int, int]) -> csr_array:
+    """Return the matrix of shape `shape` that is the sum of dense blocks; zeros are not stored."""
     entries = []
     for rows, columns, values in blocks:
         nonzero = np.flatnonzero(values)
@@ -24,9 +24,9 @@ def assembled(blocks: Sequence[Blocks], size: tuple[int, int]) -> csr_array:
         positions = (np.broadcast_to(index, values.shape).ravel()[nonzero] for index in (row, column))
         entries.append((values.ravel()[nonzero], *positions))
     if not entries:
-        return csr_array(size)
+        return csr_array(shape)
     data, row, column = map(np.concatenate, zip(*entries, strict=True))
-    return csr_array(coo_array((data, (row, column)), shape=size))
+    return csr_array(coo_array((data, (row, column)), shape=shape))
 
 
 def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_array:
@@ -40,9 +40,9 @@ def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_arr
     return shapes
 
 
-def sum_of_blocks(K: bsr_array, more: csr_array | bsr_array) -> bsr_array:
+def sum_of_blocks(K: bsr_array, other: csr_array | bsr_array) -> bsr_array:
     """Return the sum of two matrices (n, n), with the block size of the first one and sorted blocks."""
-    total = bsr_array(K + more.tobsr(K.blocksize))
+    total = bsr_array(K + other.tobsr(K.blocksize))
     total.sort_indices()
     return total
 
@@ -96,13 +96,13 @@ def taken(matrix: csr_array, rows: Indices) -> csr_array:
     return matrix if len(rows) == matrix.shape[0] else matrix[rows]
 
 
-def without_remnants(matrix: csr_array, origin: csr_array, least: Array | float) -> csr_array:
+def without_round_off(matrix: csr_array, origin: csr_array, threshold: Array | float) -> csr_array:
     """Return the matrix (m, n) without the entries of rows that consist of round-off.
 
-    The entries of a row are removed if none of them exceeds `least`, a number or one for each row, times the largest entry of
-    the same row of `origin`, in absolute values.
+    The entries of a row are removed if none of them exceeds `threshold`, a number or one for each row, times the largest
+    entry of the same row of `origin`, in absolute values.
     """
-    significant = _row_maxima(matrix) > least * _row_maxima(origin)
+    significant = _row_maxima(matrix) > threshold * _row_maxima(origin)
     return matrix if significant.all() else scaled(matrix, significant)
 
 
@@ -112,7 +112,7 @@ def _row_maxima(matrix: csr_array) -> Array:
     Duplicate entries of the matrix are summed in place.
     """
     matrix.sum_duplicates()
-    maxima, filled = np.zeros(matrix.shape[0]), np.flatnonzero(np.diff(matrix.indptr))
-    if len(filled):
-        maxima[filled] = np.maximum.reduceat(np.abs(matrix.data), matrix.indptr[filled])
+    maxima, nonempty = np.zeros(matrix.shape[0]), np.flatnonzero(np.diff(matrix.indptr))
+    if len(nonempty):
+        maxima[nonempty] = np.maximum.reduceat(np.abs(matrix.data), matrix.indptr[nonempty])
     return maxima

@@ -15,7 +15,7 @@ from fastcontact.linear.sparse_rows import entry_rows, scaled
 
 # Largest relative difference between two sets of springs, or between the weights of eliminated unknowns, for which the same
 # preconditioner is used.
-ALIKE = 0.3
+MAX_DIFFERENCE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,13 +55,13 @@ class Springs:
         """Return these springs together with `others`."""
         if others is None:
             return self
-        both = (self, others)
-        rows = csr_array(vstack([springs.rows for springs in both], format="csr"))
+        sets = (self, others)
+        rows = csr_array(vstack([springs.rows for springs in sets], format="csr"))
         force_rows = None
         if self.force_rows is not None or others.force_rows is not None:
-            rows_of_forces = [springs.rows if springs.force_rows is None else springs.force_rows for springs in both]
+            rows_of_forces = [springs.rows if springs.force_rows is None else springs.force_rows for springs in sets]
             force_rows = csr_array(vstack(rows_of_forces, format="csr"))
-        return Springs(rows, np.concatenate([springs.stiffness for springs in both]), force_rows)
+        return Springs(rows, np.concatenate([springs.stiffness for springs in sets]), force_rows)
 
     def reduced(self, pivots: Indices, weights: csr_array) -> Springs:
         """Return the springs after the elimination ``u[pivots] = weights @ u`` with weights (m, n).
@@ -93,9 +93,9 @@ class Springs:
         shape = (len(arrays["stiffness"]), n)
         return cls(csr_array((arrays["data"], arrays["indices"], arrays["indptr"]), shape=shape), arrays["stiffness"])
 
-    def alike(self, other: Springs | None) -> bool:
-        """Return whether `other` springs have nearly the same rows and stiffnesses, see ALIKE."""
+    def is_similar(self, other: Springs | None) -> bool:
+        """Return whether the springs `other` have nearly the same rows and stiffnesses, see MAX_DIFFERENCE."""
         if other is None or self.rows.shape != other.rows.shape:
             return False
-        own_rows, other_rows = (scaled(springs.rows, np.sqrt(springs.stiffness)) for springs in (self, other))
-        return bool(abs(own_rows - other_rows).sum() <= ALIKE * abs(other_rows).sum())
+        rows, other_rows = (scaled(springs.rows, np.sqrt(springs.stiffness)) for springs in (self, other))
+        return bool(abs(rows - other_rows).sum() <= MAX_DIFFERENCE * abs(other_rows).sum())

@@ -7,7 +7,7 @@ import numpy as np
 from fastcontact.arrays import Array
 
 
-def area_vectors(corners: Array, dN: Array) -> Array:
+def area_vectors(x: Array, dN: Array) -> Array:
     """Return the area vectors (n, q, dim) per unit of the reference facet [length^(dim - 1)].
 
     The vector of a line points to the right of its direction. That of a face points to the side from which its nodes are
@@ -15,19 +15,19 @@ def area_vectors(corners: Array, dN: Array) -> Array:
 
     Parameters
     ----------
-    corners : ndarray (n, k, dim)
+    x : ndarray (n, k, dim)
         Positions of the nodes of facets of one element type [length].
     dN : ndarray (q, k, dim - 1)
         Derivatives of the shape functions at q points [-].
     """
-    tangents = np.einsum("qkj,nkd->nqdj", dN, corners)
-    if corners.shape[2] == 2:
+    tangents = np.einsum("qkj,nkd->nqdj", dN, x)
+    if x.shape[2] == 2:
         return np.asarray(tangents[..., ::-1, 0] * (1.0, -1.0))
     return np.cross(tangents[..., 0], tangents[..., 1])
 
 
 def weighted_area_vectors(
-    corners: Array, N: Array, dN: Array, weights: Array, test: Array, axisymmetric: bool
+    x: Array, N: Array, dN: Array, weights: Array, test: Array, axisymmetric: bool
 ) -> tuple[Array, Array]:
     """Return integrals of area vectors times test functions, and their derivatives with respect to the nodal positions.
 
@@ -35,7 +35,7 @@ def weighted_area_vectors(
 
     Parameters
     ----------
-    corners : ndarray (n, k, dim)
+    x : ndarray (n, k, dim)
         Positions of the nodes of facets of one element type [length].
     N, dN : ndarray (q, k), ndarray (q, k, dim - 1)
         Shape functions of the facets and their derivatives [-].
@@ -53,17 +53,17 @@ def weighted_area_vectors(
     derivative : ndarray (n, k, dim, k, dim)
         Derivatives, with the node and the component of the position as the last two indices [length].
     """
-    normal = area_vectors(corners, dN)
-    derivative = np.zeros((*normal.shape[:2], dN.shape[1], corners.shape[2], corners.shape[2]))
-    if corners.shape[2] == 2:
+    normal = area_vectors(x, dN)
+    derivative = np.zeros((*normal.shape[:2], dN.shape[1], x.shape[2], x.shape[2]))
+    if x.shape[2] == 2:
         derivative[..., 0, 1], derivative[..., 1, 0] = dN[:, :, 0], -dN[:, :, 0]
     else:
-        first, second = np.einsum("qkj,nkd->jnqd", dN, corners)
+        first, second = np.einsum("qkj,nkd->jnqd", dN, x)
         for j, unit in enumerate(np.eye(3)):
             derivative[..., j] = np.cross(unit, second)[:, :, None] * dN[:, :, 0, None]
             derivative[..., j] += np.cross(first, unit)[:, :, None] * dN[:, :, 1, None]
     if axisymmetric:
-        circle = 2.0 * np.pi * corners[:, :, 0] @ N.T
+        circle = 2.0 * np.pi * x[:, :, 0] @ N.T
         derivative *= circle[..., None, None, None]
         derivative[..., 0] += 2.0 * np.pi * np.einsum("qb,fqi->fqbi", N, normal)
         normal = normal * circle[..., None]

@@ -10,12 +10,12 @@ from urllib.parse import quote
 
 import numpy as np
 
-from fastcontact.arrays import REFUSAL, is_masked
+from fastcontact.arrays import MASKED_ENTRIES, is_masked
 from fastcontact.errors import FileError, MeshError, warn
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.files.meshio_content import INCONSISTENCY_ERRORS, VERTEX, mesh_of
-from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_parts
+from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_mesh
 from fastcontact.mesh.mesh import Mesh
 
 # Prefix of the arrays of 0 and 1 that represent groups in result files.
@@ -58,10 +58,10 @@ def from_meshio(mesh: Any) -> Mesh:
         raise MeshError(f"from_meshio takes a meshio.Mesh, not {type(mesh).__name__}")
     sets = [mesh.cell_data, mesh.cell_sets, getattr(mesh, "point_data", {}), getattr(mesh, "point_sets", {})]
     if is_masked([mesh.points, *(block.data for block in mesh.cells), *sets]):
-        raise MeshError(f"meshio's mesh {REFUSAL}")
+        raise MeshError(f"meshio's mesh {MASKED_ENTRIES}")
     # For files of Gmsh, meshio keeps the dimension with the names of tags, and a cell occurs once for each of its groups.
     file_format = "gmsh" if any(key.startswith("gmsh:") for key in mesh.cell_data) else ""
-    return _mesh_of(plain_parts(mesh), file_format, "meshio's mesh")
+    return _mesh_of(plain_mesh(mesh), file_format, "meshio's mesh")
 
 
 def from_pyvista(grid: Any) -> Mesh:

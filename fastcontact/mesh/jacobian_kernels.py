@@ -20,7 +20,7 @@ def transposed(dN):
 
 @innermost_kernel
 def jacobian_2d(x, slopes, q):
-    """Return the four entries of J, row by row, for nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
+    """Return the four entries of J, row by row, at point q, for nodes x (2, n_nodes), slopes dN / dxi (n_q, 2, n_nodes)."""
     j00 = j01 = j10 = j11 = 0.0
     for a in range(x.shape[1]):
         r, s = slopes[q, 0, a], slopes[q, 1, a]
@@ -33,7 +33,7 @@ def jacobian_2d(x, slopes, q):
 
 @innermost_kernel
 def jacobian_3d(x, slopes, q):
-    """Return the nine entries of J, row by row, for nodes x (3, n_nodes) at point q of the slopes (n_q, 3, n_nodes)."""
+    """Return the nine entries of J, row by row, at point q, for nodes x (3, n_nodes), slopes dN / dxi (n_q, 3, n_nodes)."""
     j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
     for a in range(x.shape[1]):
         r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
@@ -69,7 +69,8 @@ def at_nodes(values, cells, c, x):
 def inverse_jacobian(x, dN, q, J, inverse):
     """Fill `inverse` (dim, dim) with the derivatives dxi_k / dx_i at [i, k], for nodes `x` (n_nodes, dim); return det J.
 
-    `dN` (n_q, n_nodes, dim) are shape derivatives, `J` (dim, dim) is overwritten; dim is 2 or 3.
+    `dN` (n_q, n_nodes, dim) are the derivatives of the shape functions, of which those at point q are used. `J` (dim, dim) is
+    overwritten by dx_i / dxi_k at [k, i]; dim is 2 or 3.
     """
     dim = x.shape[1]
     for k in range(dim):
@@ -97,7 +98,10 @@ def inverse_jacobian(x, dN, q, J, inverse):
 
 @kernel
 def gradients(dN, q, inverse, gradient):
-    """Fill `gradient` (n_nodes, dim) with the derivatives of shape functions in x, by the inverse Jacobian (dim, dim)."""
+    """Fill `gradient` (n_nodes, dim) with the derivatives of the shape functions with respect to x at point q.
+
+    `dN` (n_q, n_nodes, dim) are the derivatives in reference coordinates, `inverse` (dim, dim) that of `inverse_jacobian`.
+    """
     for a in range(dN.shape[1]):
         for i in range(inverse.shape[0]):
             value = 0.0

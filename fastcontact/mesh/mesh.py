@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
-from fastcontact.errors import MeshError, Suggesting, unknown
+from fastcontact.errors import MeshError, NameSuggestions, unknown
 from fastcontact.mesh import elements
 
 # Suffixes of the names of groups that belong to another group: the facets on the other side of a cut along the group, and
@@ -53,7 +53,7 @@ def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
 
 @typed(MeshError)
 @dataclass(frozen=True, eq=False)
-class Mesh(Suggesting):
+class Mesh(NameSuggestions):
     """Points, cells and named groups.
 
     A mesh contains solid cells, and facets (lines in 2D) that form groups on the boundary. Cells are numbered from 0,
@@ -306,13 +306,13 @@ class Mesh(Suggesting):
                 f"the function of facet group '{name}' returned {selected.dtype} of shape {selected.shape}: it must return "
                 f"True or False for each point, shape ({self.n_points},)"
             )
-        considered = np.ones(self.n_cells, bool)
+        in_group = np.ones(self.n_cells, bool)
         if of is not None:
             if not self.cells_of(of, dim=self.dim):
                 remedy = "which has no solid cells: name a body's group"
                 raise MeshError(f"facet group '{name}' cannot be taken from '{of}', {remedy}")
-            considered = np.isin(np.arange(self.n_cells), self.cell_groups[of])
-        facets = _facets_with_nodes(self, selected, between, considered)
+            in_group = np.isin(np.arange(self.n_cells), self.cell_groups[of])
+        facets = _facets_with_nodes(self, selected, between, in_group)
         if not facets:
             group_text = f" of '{of}'" if of else ""
             raise MeshError(
@@ -340,8 +340,8 @@ class Mesh(Suggesting):
         def numbers(rows_by_kind: Mapping[str, AnyArray]) -> AnyArray:
             return np.concatenate([starts[kind] + r for kind, r in rows_by_kind.items()] or [np.empty(0, np.intp)])
 
-        groups_before = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
-        return self.replace(cells=cells, cell_groups={**groups_before, **{name: numbers(rows[name]) for name in rows}})
+        old_groups = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
+        return self.replace(cells=cells, cell_groups={**old_groups, **{name: numbers(rows[name]) for name in rows}})
 
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
         """Return the mesh with a new cell group called `name`, which is the union of the cell groups `members`."""
@@ -363,7 +363,7 @@ def facets_of_cells(mesh: Mesh) -> Iterator[tuple[str, AnyArray, AnyArray]]:
             yield kind, block[:, list(facet)], numbers
 
 
-def _facets_with_nodes(mesh: Mesh, selected: Mask, between: bool, considered: Mask) -> dict[str, AnyArray]:
+def _facets_with_nodes(mesh: Mesh, selected: Mask, between: bool, in_group: Mask) -> dict[str, AnyArray]:
     """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all selected, by element type of the facet.
 
     Each facet appears once, with the orientation of its first cell. This is outward for facets of a single cell.
@@ -375,21 +375,21 @@ def _facets_with_nodes(mesh: Mesh, selected: Mask, between: bool, considered: Ma
         Whether each point is selected.
     between : bool
         If True, return the facets between two cells; if False, the facets of a single cell.
-    considered : ndarray of bool (n_cells,)
-        Whether the facets of each cell are considered.
+    in_group : ndarray of bool (n_cells,)
+        Whether the facets of each cell may be returned.
     """
     candidates: dict[str, list[tuple[AnyArray, Mask]]] = {}
     for kind, nodes, cells in facets_of_cells(mesh):
         rows = selected[nodes].all(axis=1)
-        candidates.setdefault(kind, []).append((nodes[rows], considered[cells[rows]]))
+        candidates.setdefault(kind, []).append((nodes[rows], in_group[cells[rows]]))
     facets_by_kind, n_cells = {}, 2 if between else 1
     for kind, blocks in candidates.items():
         facets, flags = map(np.concatenate, zip(*blocks, strict=True))
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
         )
-        count_considered = np.bincount(group.ravel(), flags, len(count))
-        rows = np.sort(first[(count == n_cells) & (count_considered == n_cells)])
+        count_in_group = np.bincount(group.ravel(), flags, len(count))
+        rows = np.sort(first[(count == n_cells) & (count_in_group == n_cells)])
         if len(rows):
             facets_by_kind[kind] = facets[rows]
     return facets_by_kind
@@ -400,6 +400,6 @@ def _extended_block(block: AnyArray, facets: AnyArray) -> tuple[AnyArray, Indice
     candidates = np.concatenate([block, facets])
     _, first, facet = np.unique(np.sort(candidates, axis=1), axis=0, return_index=True, return_inverse=True)
     row, rows = first[facet.ravel()], np.arange(len(candidates))  # row of the first facet with the same nodes
-    new = (row == rows) & (rows >= len(block))
-    new_row = np.where(rows < len(block), rows, len(block) + np.cumsum(new) - 1)
-    return np.concatenate([block, candidates[new]]), new_row[row[len(block) :]].astype(np.intp)
+    is_new = (row == rows) & (rows >= len(block))
+    new_row = np.where(rows < len(block), rows, len(block) + np.cumsum(is_new) - 1)
+    return np.concatenate([block, candidates[is_new]]), new_row[row[len(block) :]].astype(np.intp)

@@ -29,7 +29,7 @@ def simpson_line() -> Rule:
 
 def gauss_square(n: int) -> Rule:
     """Return the tensor-product Gauss rule with n x n points on [-1, 1]^2, exact to degree 2n - 1 in each coordinate."""
-    return square(gauss_line(n))
+    return tensor_product(gauss_line(n), gauss_line(n))
 
 
 def triangle_1() -> Rule:
@@ -44,7 +44,7 @@ def triangle_3() -> Rule:
 
 def triangle_6() -> Rule:
     """Return the six-point rule on the triangle, with interior points, exact to degree 4 (Dunavant, 1985)."""
-    return _symmetric([], [(0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)], [])
+    return _orbit_rule([], [(0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)], [])
 
 
 def triangle_3_sides() -> Rule:
@@ -55,12 +55,12 @@ def triangle_3_sides() -> Rule:
 def triangle_7() -> Rule:
     """Return the seven-point rule on the triangle, with interior points, exact to degree 5 (Radon, 1948)."""
     roots = np.sqrt(15.0) * np.array([1.0, -1.0])
-    return _symmetric([9.0 / 40.0], [((155.0 + root) / 1200.0, (6.0 + root) / 21.0) for root in roots], [])
+    return _orbit_rule([9.0 / 40.0], [((155.0 + root) / 1200.0, (6.0 + root) / 21.0) for root in roots], [])
 
 
 def triangle_12() -> Rule:
     """Return the twelve-point rule on the triangle, with interior points, exact to degree 6 (Dunavant, 1985)."""
-    return _symmetric(
+    return _orbit_rule(
         [],
         [(0.1167862757263978, 0.2492867451708992), (0.05084490637020978, 0.06308901449150417)],
         [(0.08285107561836291, 0.05314504984480938, 0.3103524510337927)],
@@ -69,7 +69,7 @@ def triangle_12() -> Rule:
 
 def triangle_16() -> Rule:
     """Return the sixteen-point rule on the triangle, with interior points, exact to degree 8 (Dunavant, 1985)."""
-    return _symmetric(
+    return _orbit_rule(
         [0.144315607677777],
         [
             (0.09509163426728974, 0.4592925882927181),
@@ -80,13 +80,13 @@ def triangle_16() -> Rule:
     )
 
 
-def _symmetric(centre: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]) -> Rule:
+def _orbit_rule(one: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]) -> Rule:
     """Return the symmetric rule on the triangle with the given orbits of one, three and six points.
 
     Each orbit is given by the weight of its points and by their independent barycentric coordinates: none for the centroid,
     one for orbits of three points, and two for orbits of six. The weights of all points add up to 1.
     """
-    points, weights = [[1.0 / 3.0, 1.0 / 3.0] for _ in centre], list(centre)
+    points, weights = [[1.0 / 3.0, 1.0 / 3.0] for _ in one], list(one)
     for weight, a in threes:
         points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
         weights += [weight] * 3
@@ -116,15 +116,10 @@ def quartered_triangle(rule: Rule) -> Rule:
     points, weights = rule
     shifts = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]])
     pieces = [shift + 0.5 * points for shift in shifts] + [0.5 - 0.5 * points]
-    return _merged(np.concatenate(pieces), np.tile(weights / 4.0, 4))
+    return _merge_points(np.concatenate(pieces), np.tile(weights / 4.0, 4))
 
 
-def square(rule: Rule) -> Rule:
-    """Return the product of a rule on [-1, 1] with itself."""
-    return tensor_product(rule, rule)
-
-
-def _merged(points: Array, weights: Array) -> Rule:
+def _merge_points(points: Array, weights: Array) -> Rule:
     """Return a rule with coincident points merged."""
     unique, index = np.unique(np.round(points, 14), axis=0, return_inverse=True)
     merged = np.zeros(len(unique))
@@ -223,7 +218,7 @@ def subdivided(rule: Rule, count: int) -> Rule:
     points, weights = rule
     starts = -1.0 + 2.0 * np.arange(count) / count
     all_points = (starts[:, None] + (points[:, 0] + 1.0) / count).ravel()
-    return _merged(all_points[:, None], np.tile(weights / count, count))
+    return _merge_points(all_points[:, None], np.tile(weights / count, count))
 
 
 def collapsed_triangle(n: int) -> Rule:

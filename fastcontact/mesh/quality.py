@@ -91,17 +91,17 @@ def quality(mesh: Mesh) -> MeshQuality:
     length = np.concatenate([block.ravel() for block in lengths]) if lengths else np.array([np.nan])
     with np.errstate(divide="ignore", invalid="ignore"):
         aspects = [(block.max(axis=1) / block.min(axis=1)).max() for block in lengths]
-    invalid = [_bad_cells(mesh, name) for name in mesh.solids]
+    checks = [_bad_cells(mesh, name) for name in mesh.solids]
     return MeshQuality(
         smallest_angle=float(np.degrees(angle.min())),
         largest_angle=float(np.degrees(angle.max())),
         shortest_edge=float(length.min()),
         longest_edge=float(length.max()),
         worst_aspect=float(max(aspects, default=np.nan)),
-        measure=float(sum(measure.sum() for measure, _, _ in invalid)),
+        measure=float(sum(measure.sum() for measure, _, _ in checks)),
         n_points=mesh.n_points,
         n_cells={name: len(block) for name, block in mesh.cells.items()},
-        n_bad=sum(int((degenerate | inverted).sum()) for _, degenerate, inverted in invalid),
+        n_bad=sum(int((degenerate | inverted).sum()) for _, degenerate, inverted in checks),
         dim=mesh.dim,
     )
 

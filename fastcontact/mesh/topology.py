@@ -68,18 +68,18 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
 
 def _check_folds(mesh: Mesh) -> None:
     """Raise MeshError if two oriented solid cells have a common facet with the same orientation."""
-    folds, owners = [], []
+    facet_keys, owners = [], []
     for kind, nodes, numbers in facets_of_cells(mesh):
-        folds.append(_oriented_keys(nodes[:, : elements.get(kind).n_corners].astype(np.int64)))
+        facet_keys.append(_oriented_keys(nodes[:, : elements.get(kind).n_corners].astype(np.int64)))
         owners.append(numbers)
-    keys, owner = np.concatenate(folds), np.concatenate(owners)
-    rows, others = equal_rows(keys)
-    if len(rows):
-        first, second = sorted((int(owner[rows[0]]), int(owner[others[0]])))
-        position = ", ".join(f"{x:.6g}" for x in mesh.points[keys[rows[0]][:2]].mean(axis=0))
+    keys, owner = np.concatenate(facet_keys), np.concatenate(owners)
+    first_rows, second_rows = equal_rows(keys)
+    if len(first_rows):
+        first, second = sorted((int(owner[first_rows[0]]), int(owner[second_rows[0]])))
+        position = ", ".join(f"{x:.6g}" for x in mesh.points[keys[first_rows[0]][:2]].mean(axis=0))
         raise MeshError(
             f"cells {first} and {second} lie on the same side of the facet between them, near ({position}), one of "
-            f"{len(rows)} such pairs: the mesh is folded there; move its nodes or remesh"
+            f"{len(first_rows)} such pairs: the mesh is folded there; move its nodes or remesh"
         )
 
 
@@ -116,13 +116,13 @@ def bodies(mesh: Mesh) -> tuple[int, Numbers]:
 
     A body is a set of solid cells that are connected by common nodes.
     """
-    blocks, none = mesh.solids.values(), np.empty(0, np.int32)
-    row = np.concatenate([none, *(np.repeat(block[:, 0], block.shape[1]) for block in blocks)])
-    column = np.concatenate([none, *(block.ravel() for block in blocks)])
+    blocks, empty = mesh.solids.values(), np.empty(0, np.int32)
+    row = np.concatenate([empty, *(np.repeat(block[:, 0], block.shape[1]) for block in blocks)])
+    column = np.concatenate([empty, *(block.ravel() for block in blocks)])
     graph = coo_array((np.ones(len(row), np.int8), (row, column)), shape=(mesh.n_points, mesh.n_points))
     label, body = connected_components(graph, directed=False)[1], np.full(mesh.n_points, -1, np.int32)
-    used = np.bincount(column, minlength=mesh.n_points) > 0
-    labels, body[used] = np.unique(label[used], return_inverse=True)
+    in_solid = np.bincount(column, minlength=mesh.n_points) > 0
+    labels, body[in_solid] = np.unique(label[in_solid], return_inverse=True)
     body.setflags(write=False)
     return len(labels), body
 
@@ -157,7 +157,7 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
     by_kind: dict[str, list[tuple[Numbers, Numbers]]] = {}
     for kind, nodes, numbers in facets_of_cells(mesh):
         by_kind.setdefault(kind, []).append((nodes, numbers))
-    outer, behind, pairs = {}, {}, [np.empty((2, 0), np.int32)]
+    outer, cell_numbers, pairs = {}, {}, [np.empty((2, 0), np.int32)]
     for name, blocks in by_kind.items():
         facets, owner = map(np.concatenate, zip(*blocks, strict=True))
         equal = np.stack(equal_rows(np.sort(facets, axis=1)))
@@ -165,13 +165,13 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
         single[equal] = False
         pairs.append(owner[equal])
         if single.any():
-            outer[name], behind[name] = facets[single], owner[single]
+            outer[name], cell_numbers[name] = facets[single], owner[single]
             outer[name].setflags(write=False)
     ends, n_cells = np.concatenate(pairs, axis=1), sum(map(len, mesh.cells.values()))
     graph = coo_array((np.ones(ends.shape[1], np.int8), tuple(ends)), shape=(n_cells, n_cells))
     label = connected_components(graph, directed=False)[1]
     lowest = np.unique(label, return_index=True)[1].astype(np.int32)
-    return MappingProxyType(outer), lowest[label], MappingProxyType(behind)
+    return MappingProxyType(outer), lowest[label], MappingProxyType(cell_numbers)
 
 
 def equal_rows(rows: Indices | Numbers) -> tuple[Indices, Indices]:
@@ -320,24 +320,24 @@ class RigidParts:
 def rigid_parts(mesh: Mesh) -> RigidParts:
     """Return the rigid parts of the bodies of a mesh."""
     count, body = bodies(mesh)
-    joined = cells_joined_by_facets(mesh)
-    roots = {name: joined[mesh.offsets[name] :][: len(block)] for name, block in mesh.solids.items()}
+    lowest_cell = cells_joined_by_facets(mesh)
+    roots = {name: lowest_cell[mesh.offsets[name] :][: len(block)] for name, block in mesh.solids.items()}
     first, label = np.unique(np.concatenate(list(roots.values())), return_inverse=True)
     if len(first) == count:
-        none = np.empty(0, np.intp)
-        return RigidParts(count, body.astype(np.intp), none, none)
+        empty = np.empty(0, np.intp)
+        return RigidParts(count, body.astype(np.intp), empty, empty)
     part, node, part_of_node = _shared_nodes(mesh, label.ravel())
     while True:
         first, second, common = _common_nodes(node, part_of_node)
-        rigid = _rigidly_connected(mesh.points, first, second, common)
-        if not rigid.any():
+        is_rigid = _rigidly_connected(mesh.points, first, second, common)
+        if not is_rigid.any():
             break
         count = int(max(part.max(), part_of_node.max())) + 1
-        ends = first[rigid], second[rigid]
+        ends = first[is_rigid], second[is_rigid]
         graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(count, count))
-        _, merged = connected_components(graph, directed=False)
-        part = np.where(part >= 0, merged[part], -1)
-        node, part_of_node = np.unique(np.stack([node, merged[part_of_node]]), axis=1)
+        _, new_part = connected_components(graph, directed=False)
+        part = np.where(part >= 0, new_part[part], -1)
+        node, part_of_node = np.unique(np.stack([node, new_part[part_of_node]]), axis=1)
     hinges = np.isin(node, common)
     return RigidParts(int(part.max()) + 1, part, node[hinges], part_of_node[hinges])
 

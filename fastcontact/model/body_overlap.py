@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import closest_of_kinds
+from fastcontact.contact.projection import closest_of_types
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -20,21 +20,21 @@ ON_SURFACE = 1e-10
 
 
 def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[int, int, float, Array]]:
-    """Return (body, other, depth, position) for each pair of bodies such that the first has nodes inside the second.
+    """Return (first, second, depth, position) for each ordered pair of bodies whose first has nodes inside the second.
 
     `depth` is the largest penetration depth of these nodes, see `depths` [length], and `position` (dim,) is the
     position of the node with this depth [length].
     """
     overlaps = []
-    for body, other, points, depth in depths(mesh, kinematics, coordinates):
+    for first, second, points, depth in depths(mesh, kinematics, coordinates):
         deepest = int(np.argmax(depth))
         if depth[deepest] > 0.0:
-            overlaps.append((body, other, float(depth[deepest]), coordinates[points[deepest]]))
+            overlaps.append((first, second, float(depth[deepest]), coordinates[points[deepest]]))
     return overlaps
 
 
 def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[int, int, Indices, Array]]:
-    """Yield (body, other, points (n,), depth (n,)) for each ordered pair of bodies with overlapping bounding boxes.
+    """Yield (first, second, points (n,), depth (n,)) for each ordered pair of bodies with overlapping bounding boxes.
 
     `points` are those outer nodes of the first body that lie in the bounding box of the second. Depths are their
     distances to the outer surface of the second body, and zero for points outside that body [length]. The axis of an
@@ -51,20 +51,20 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
     nodal_tolerance = np.zeros(mesh.n_points)
     for name, facets in outer.items():
         np.maximum.at(nodal_tolerance, facets, _curvature_tolerance(name, coordinates[facets])[:, None])
-    for body, other in permutations(range(count), 2):
-        low, high = coordinates[nodes[other]].min(axis=0), coordinates[nodes[other]].max(axis=0)
-        near = nodes[body]
+    for first, second in permutations(range(count), 2):
+        low, high = coordinates[nodes[second]].min(axis=0), coordinates[nodes[second]].max(axis=0)
+        near = nodes[first]
         near = near[((coordinates[near] >= low) & (coordinates[near] <= high)).all(axis=1)]
         if not len(near):
             continue
-        blocks = {name: coordinates[facets] for name, facets in sides[other].items() if len(facets)}
+        blocks = {name: coordinates[facets] for name, facets in sides[second].items() if len(facets)}
         off_axis = None
         if kinematics == "axisymmetric":
             size = max(float(np.abs(block).max()) for block in blocks.values())
             off_axis = [(np.abs(block[:, :, 0]) > LENGTH_ROUND_OFF * size).any(axis=1) for block in blocks.values()]
         depth, facet = _depths(coordinates[near], list(blocks.values()), off_axis)
         tolerance = np.concatenate([_curvature_tolerance(name, block) for name, block in blocks.items()])[facet]
-        yield body, other, near, np.where(depth <= tolerance + nodal_tolerance[near], 0.0, depth)
+        yield first, second, near, np.where(depth <= tolerance + nodal_tolerance[near], 0.0, depth)
 
 
 def _curvature_tolerance(name: str, nodes: Array) -> Array:
@@ -92,10 +92,11 @@ def _depths(points: Array, facets: list[Array], selected: list[Mask] | None = No
     """
     selected = [np.ones(len(nodes), bool) for nodes in facets] if selected is None else selected
     targets = [nodes[mask] for nodes, mask in zip(facets, selected, strict=True)]
-    closest = closest_of_kinds(points, [nodes for nodes in targets if len(nodes)])
+    closest = closest_of_types(points, [nodes for nodes in targets if len(nodes)])
     size = max(float(np.abs(nodes).max()) for nodes in facets)
     height = np.einsum("nd,nd->n", points - closest.position, closest.normal)  # above the tangent planes
     inside = height < 0
+    # The vector from the closest point is parallel to the normal only if this point lies in the interior of a facet.
     undecided = np.flatnonzero((np.abs(height) < 0.999 * closest.distance) & (closest.distance > ON_SURFACE * size))
     if len(undecided):
         pieces = [nodes[:, _flat_pieces(nodes)].reshape(-1, *2 * nodes.shape[2:]) for nodes in facets]

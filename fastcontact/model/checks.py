@@ -14,7 +14,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import penetration
 from fastcontact.model.ramp import Table
-from fastcontact.model.rigid_motions import FreeMotions, body_name, grouped, node_at
+from fastcontact.model.rigid_motions import FreeMotions, body_name, grouped_by_body, node_at
 from fastcontact.round_off import SINGLE_PRECISION
 
 if TYPE_CHECKING:
@@ -32,16 +32,16 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
             f"{node_at(mesh, motions.hinges[0])}): merge whole facets, or leave the parts separate and define the contact"
         )
     raise ModelError(
-        f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {grouped(motions.names())}. "
+        f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {grouped_by_body(motions.names())}. "
         "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"
         f"{hinges}"
     )
 
 
-def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[float]) -> None:
-    """Raise ModelError if the table of a load, support or constraint (name, table) does not cover the instants."""
+def check_ramps(named_tables: Iterable[tuple[str, Table | None]], instants: Iterable[float]) -> None:
+    """Raise ModelError if one of the tables (name, table) of loads, supports and constraints does not cover the instants."""
     instants = list(instants)
-    for name, table in ramped:
+    for name, table in named_tables:
         outside = [t for t in instants if table is not None and not table[0][0] <= t <= table[-1][0]]
         if outside and table is not None:
             raise ModelError(
@@ -134,11 +134,11 @@ def check_overlap(mesh: Mesh, kinematics: str, groups: Iterable[tuple[str, str]]
     `groups` contains the names (secondary, primary) of the groups of the contact pairs.
     """
     _, body_of = bodies(mesh)
-    joined = {frozenset((int(body_of[mesh.points_of(a)[0]]), int(body_of[mesh.points_of(b)[0]]))) for a, b in groups}
+    pairs = {frozenset((int(body_of[mesh.points_of(a)[0]]), int(body_of[mesh.points_of(b)[0]]))) for a, b in groups}
     size = float(np.ptp(mesh.points, axis=0).max())
-    for body, other, depth, position in penetration(mesh, kinematics, mesh.points):
-        if depth > SINGLE_PRECISION * size and frozenset((body, other)) not in joined:
+    for first, second, depth, position in penetration(mesh, kinematics, mesh.points):
+        if depth > SINGLE_PRECISION * size and frozenset((first, second)) not in pairs:
             raise ModelError(
-                f"body {body_name(mesh, body_of, body)} overlaps body {body_name(mesh, body_of, other)} by {depth:.3g} near "
-                f"{position} before any load, and no contact pair joins them: add the contact or move one of them"
+                f"body {body_name(mesh, body_of, first)} overlaps body {body_name(mesh, body_of, second)} by {depth:.3g} "
+                f"near {position} before any load, and no contact pair joins them: add the contact or move one of them"
             )

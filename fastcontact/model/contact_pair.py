@@ -39,7 +39,7 @@ class ContactPair:
     If there is an `obstacle`, `primary` is empty. The displacement of the obstacle at multiplier 1 is `motion`
     [length], and its history is `ramp`; None means the history of the analysis. Components in which `force` is not None
     are driven by this force instead, which is given at multiplier 1 [force]. The obstacle rotates by `rotation` with
-    the history `rotation_ramp`, by default `ramp`. For automatically detected pairs, `found_gap` is the smallest gap at
+    the history `rotation_ramp`, by default `ramp`. For automatically detected pairs, `detected_gap` is the smallest gap at
     detection [length].
     """
 
@@ -55,7 +55,7 @@ class ContactPair:
     rotation: Rotation | None = None
     rotation_ramp: Table | None = None
     fluid: FluidPressure | None = None
-    found_gap: float | None = None
+    detected_gap: float | None = None
 
     @property
     def method(self) -> str:

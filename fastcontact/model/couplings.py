@@ -241,8 +241,8 @@ def distributing_rows(
 ) -> csr_array:
     """Return the rows (m, n_dofs) of a distributing coupling: a reference point follows the mean motion of points.
 
-    The rotation theta is determined by least squares, ``J theta = sum of w r x u``, where r is the arm from the weighted
-    centroid of the points and ``J = sum of w (r . r I - r r^T)``.
+    The rotation theta is determined by least squares, ``J theta = sum of w r x u``, where w is the weight of a
+    point, u its displacement, r its arm from the weighted centroid of all points and ``J = sum of w (r . r I - r r^T)``.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.model.contact_pair import ContactPair
 
-KINDS = {
+KINEMATICS = {
     "axisymmetric": "axisymmetric model (x is the radius, y the axis; forces are those over the full circle)",
     "plane_strain": "model in plane strain (forces are those for a depth of 1)",
     "plane_stress": "model in plane stress (forces are those for a thickness of 1)",
@@ -27,7 +27,7 @@ def sentences(model: Any) -> Iterator[str]:
     mesh = model.mesh
     cells = " and ".join(f"{len(block)} {name}" for name, block in mesh.solids.items())
     article = "An" if model.kinematics == "axisymmetric" else "A"
-    yield f"{article} {KINDS[model.kinematics]} of {mesh.n_points} points, {cells}: {model.n_dofs} degrees of freedom."
+    yield f"{article} {KINEMATICS[model.kinematics]} of {mesh.n_points} points, {cells}: {model.n_dofs} degrees of freedom."
     if unit_names := [f"{kind} in {unit}" for kind, unit in model.units.items() if unit not in ("", "-")]:
         yield f"Units: {', '.join(unit_names)}."
     for (material, groups), modes in zip(model.materials, model.uses_incompatible_modes(), strict=True):
@@ -54,9 +54,9 @@ def sentences(model: Any) -> Iterator[str]:
             history += f", from {max(load.begins, 0.0):g} to {load.ends:g}"
         yield f"Heat: {load.name.removeprefix('the ')}: {', '.join(map(_value, load.values))}{history}."
     for state in model.initial_states:
-        parts = [f"{COMPONENTS[number]} = {value:g}" for number, value in state.components.items()]
+        components = [f"{COMPONENTS[number]} = {value:g}" for number, value in state.components.items()]
         kind, groups = state.name.removeprefix("the initial ").split(" of ", 1)
-        yield f"Initial {kind}: {', '.join(parts)} in {groups}{_history(None if state.ramp == ALWAYS else state.ramp)}."
+        yield f"Initial {kind}: {', '.join(components)} in {groups}{_history(None if state.ramp == ALWAYS else state.ramp)}."
     yield from dict.fromkeys(f"Relation: {relation.name}{_history(relation.ramp)}." for relation in model.relations)
     for spring in model.springs:
         yield f"Spring: {spring.name.removeprefix('the spring ')}."
@@ -85,8 +85,8 @@ def _supports(model: Any) -> Iterator[str]:
         texts = by_group.setdefault((support.group, support.ramp), [])
         texts.append(f"{'xyz'[support.component]} = {_value(support.value)}")
         if support.rotation is not None and support.component == model.mesh.dim - 1:
-            turn = support.rotation
-            texts.append(f"rotated by {turn.angle:g} rad about {turn.centre}{_history(support.rotation_ramp)}")
+            rotation = support.rotation
+            texts.append(f"rotated by {rotation.angle:g} rad about {rotation.centre}{_history(support.rotation_ramp)}")
     for (group, ramp), components in by_group.items():
         count = len(model.mesh.points_of(group))
         yield f"Support: {', '.join(components)} on '{group}' ({count} points){_history(ramp)}."
@@ -121,14 +121,14 @@ def _history(ramp: Any) -> str:
 
 def _contact(model: Any, pair: ContactPair) -> str:
     """Return the sides, the formulation, the law and the options of a contact pair."""
-    nodes = len(model.mesh.points_of(pair.secondary))
+    n_nodes = len(model.mesh.points_of(pair.secondary))
     friction = pair.options.get("friction")
     law = f"with friction {friction:g}" if friction else "without friction"
     kind = pair.options.get("kind", "unilateral")
     law = {"tied": "tied", "gap_only": "gap only, without forces"}.get(kind, law if kind == "unilateral" else kind)
     opposite = f"'{pair.primary}'" if pair.obstacle is None else pair.opposite
-    others = sorted({*pair.options} - {"friction", "kind", "multipliers"})
-    text = f" (further options: {', '.join(others)})" if others else ""
+    further_options = sorted({*pair.options} - {"friction", "kind", "multipliers"})
+    text = f" (further options: {', '.join(further_options)})" if further_options else ""
     if pair.fluid is not None:
         text += f", fluid of pressure {pair.fluid.pressure:g} from '{pair.fluid.source}'{_history(pair.fluid.ramp)}"
-    return f"'{pair.secondary}' ({nodes} points) on {opposite}, {pair.method}, {law}{text}"
+    return f"'{pair.secondary}' ({n_nodes} points) on {opposite}, {pair.method}, {law}{text}"

@@ -28,7 +28,7 @@ from fastcontact.model.model import Model
 from fastcontact.model.parts.base import Support
 
 # Number of hexadecimal digits of a digest.
-LENGTH = 16
+N_DIGITS = 16
 SMOOTHING = "surface_smoothing of contact"
 
 
@@ -38,7 +38,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     Keys are the names of the parts in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
-    modes = model.uses_incompatible_modes()
+    incompatible_modes = model.uses_incompatible_modes()
     inputs: dict[str, Any] = {
         "the kinematics": model.kinematics,
         **({"the strain": model.strain} if model.strain != "small" else {}),
@@ -49,7 +49,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
         **({"the heat": [model.reference_temperature, _unordered(model.heat_loads, mesh)]} if model.conducts else {}),
         **{f"the conductance of contact '{name}'": law.signature for name, law in model.conductances().items()},
-        **({"the incompatible modes": modes} if any(modes) else {}),
+        **({"the incompatible modes": incompatible_modes} if any(incompatible_modes) else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
@@ -67,16 +67,16 @@ def differing_parts(first: Mapping[str, str], second: Mapping[str, str]) -> list
 
 
 def formulation_of_digest(model: Model, name: str, digest: str | None) -> str | None:
-    """Return the formulation and its options with which pair `name` has the given `digest`; None if there are none.
+    """Return the formulation and its options with which pair `name` has the given `digest`; None if no formulation has it.
 
     Earlier versions chose other default formulations for pairs whose formulation is not given.
     """
     (pair,) = (candidate for candidate in model.contact if candidate.name == name)
-    bare = _without(pair, "surface_smoothing", "multipliers")
+    base_pair = _without(pair, "surface_smoothing", "multipliers")
     choices: list[tuple[str, dict[str, str]]] = [(formulation, {}) for formulation in FORMULATIONS]
     choices += [("mortar", {"multipliers": multipliers}) for multipliers in ("standard", "dual")]
     for formulation, options in choices:
-        candidate = dataclasses.replace(bare, formulation=formulation, options={**bare.options, **options})
+        candidate = dataclasses.replace(base_pair, formulation=formulation, options={**base_pair.options, **options})
         if _digest(candidate, model.mesh) == digest:
             return ", ".join(f"{key}='{value}'" for key, value in {"formulation": formulation, **options}.items())
     return None
@@ -99,10 +99,10 @@ def digest_of_mesh(mesh: Mesh) -> str:
 
 
 def _digest(value: Any, mesh: Mesh) -> str:
-    """Return the first LENGTH hexadecimal digits of the SHA-256 hash of a value."""
+    """Return the first N_DIGITS hexadecimal digits of the SHA-256 hash of a value."""
     digest = hashlib.sha256()
     _update(value, digest.update, mesh, mesh.points)
-    return digest.hexdigest()[:LENGTH]
+    return digest.hexdigest()[:N_DIGITS]
 
 
 def _update(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
@@ -110,7 +110,7 @@ def _update(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array)
     if isinstance(value, Mesh):
         value = [value.points, value.cells, value.cell_groups, value.point_groups]
     if isinstance(value, Varying):
-        value = value.given
+        value = value.source
     if isinstance(value, csr_array):
         value = [value.data, value.indices.astype(np.int64), value.indptr.astype(np.int64)]
     if isinstance(value, np.ndarray):
@@ -155,7 +155,7 @@ def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points:
     if isinstance(value, Temperature):  # the ramp of a history contains its instants
         fields = [field for field in fields if field.name not in ("times", "instant")]
     if isinstance(value, ContactPair):
-        fields = [f for f in fields if f.name != "found_gap" and (f.name != "fluid" or value.fluid is not None)]
+        fields = [f for f in fields if f.name != "detected_gap" and (f.name != "fluid" or value.fluid is not None)]
     if isinstance(value, LinearElastic):  # include only the treatment of dilatation that takes effect
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")

@@ -86,27 +86,27 @@ class ForceDrivenObstacles:
         return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
 
     def supported(self, fixed: Mask) -> Mask:
-        """Return the mask (n_points + n, dim) of supported components, from the mask of the points."""
+        """Return the mask (n_points + n_obstacles, dim) of supported components, from the mask of the points."""
         prescribed = [[force is None for force in pair.force] for pair in self.pairs]
         return np.vstack([fixed, np.array(prescribed, bool).reshape(-1, self.shape[1])])
 
     def prescribed(self, by_ramp: dict[PartHistory, Array]) -> dict[PartHistory, Array]:
-        """Return the displacements (n_points + n, dim) at multiplier 1 by ramp, including those of the obstacles [length]."""
+        """Return the displacements (n_points + n_obstacles, dim) of mesh and obstacles at multiplier 1, by ramp [length]."""
         return self._extended(by_ramp, [pair.motion for pair in self.pairs])
 
     def forces(self, by_ramp: Mapping[Table | None, Array]) -> dict[PartHistory, Array]:
-        """Return the forces (n_points + n, dim) at multiplier 1 by ramp, including those on the obstacles [force]."""
+        """Return the forces (n_points + n_obstacles, dim) on mesh and obstacles at multiplier 1, by ramp [force]."""
         return self._extended(by_ramp, [tuple(force or 0.0 for force in pair.force) for pair in self.pairs])
 
     def _extended(self, by_ramp: Mapping[Any, Array], values: Sequence[tuple[float, ...]]) -> dict[PartHistory, Array]:
         """Return nodal values by ramp, extended by the `values` of the obstacles."""
-        n, dim = self.shape
+        n_points, dim = self.shape
         zero = np.zeros((len(self), dim))
         extended: dict[PartHistory, Array] = {ramp: np.vstack([rows, zero]) for ramp, rows in by_ramp.items()}
         for number, (pair, value) in enumerate(zip(self.pairs, values, strict=True)):
             if any(value):
-                rows = extended.setdefault(pair.ramp, np.zeros((n + len(self), dim)))
-                rows[n + number] = value
+                rows = extended.setdefault(pair.ramp, np.zeros((n_points + len(self), dim)))
+                rows[n_points + number] = value
         return extended
 
     def motions(self, motions: FreeMotions) -> FreeMotions:
@@ -114,9 +114,9 @@ class ForceDrivenObstacles:
         if not self.pairs:
             return motions
         free = np.flatnonzero(self.without_stiffness)
-        n, dim = self.shape
+        n_points, dim = self.shape
         labels = [
-            Label(f"obstacle '{self.pairs[dof // dim - n].name}'", f"translation along {'xyz'[dof % dim]}")
+            Label(f"obstacle '{self.pairs[dof // dim - n_points].name}'", f"translation along {'xyz'[dof % dim]}")
             for dof in free.tolist()
         ]
         return motions.with_translations(free, labels, self.n_dofs)
@@ -126,23 +126,23 @@ class ForceDrivenObstacles:
         return np.vstack([modes, np.tile(np.eye(self.shape[1], modes.shape[1]), (len(self), 1))])
 
     def constraints(
-        self, name: str, constraints: Constraints, position: Array, moved: Array | None = None
+        self, name: str, constraints: Constraints, position: Array, included_motion: Array | None = None
     ) -> Constraints:
         """Return the constraints of pair `name` with columns for the displacements of all obstacles.
 
         `constraints` were computed with the obstacle of the pair fixed at its displacement `position` (dim,) [length].
-        Slip then includes the motion of the obstacle. If the obstacle also rotates, `moved` (dim,) is the motion in the step
-        that the slip of `constraints` already includes [length].
+        Slip then includes the motion of the obstacle. If the obstacle also rotates, `included_motion` (dim,) is the motion
+        in the step that the slip of `constraints` already includes [length].
         """
         number = self.number(name)
         if number is None:
-            with_zeros = tuple(self._with_empty_columns(tangent) for tangent in constraints.tangents)
-            return dataclasses.replace(constraints, B=self._with_empty_columns(constraints.B), tangents=with_zeros)
+            tangents = tuple(self._with_empty_columns(tangent) for tangent in constraints.tangents)
+            return dataclasses.replace(constraints, B=self._with_empty_columns(constraints.B), tangents=tangents)
         B, normal = self._with_motion(constraints.B, number)
         tangents = tuple(self._with_motion(tangent, number)[0] for tangent in constraints.tangents)
         slip0 = np.zeros_like(constraints.slip0)
-        if moved is not None and constraints.tangents:
-            slip0 = constraints.slip0 + np.stack([t @ moved for t in constraints.directions])
+        if included_motion is not None and constraints.tangents:
+            slip0 = constraints.slip0 + np.stack([t @ included_motion for t in constraints.directions])
         gap0 = constraints.gap0 + normal @ position
         return dataclasses.replace(constraints, B=B, gap0=gap0, tangents=tangents, slip0=slip0)
 
@@ -154,8 +154,8 @@ class ForceDrivenObstacles:
 
     def _with_motion(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
         """Return rows (m, n_dofs) that include the motion of an obstacle, and their directions (m, dim)."""
-        n, dim = self.shape
-        direction = rows @ np.tile(np.eye(dim), (n, 1))
+        n_points, dim = self.shape
+        direction = rows @ np.tile(np.eye(dim), (n_points, 1))
         obstacle_columns = np.zeros((rows.shape[0], len(self) * dim))
         obstacle_columns[:, number * dim : (number + 1) * dim] = -direction
         return csr_array(hstack([rows, csr_array(obstacle_columns)], format="csr")), direction

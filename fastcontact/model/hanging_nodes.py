@@ -71,12 +71,12 @@ def hanging_nodes_warning(model: Model) -> str:
     )
 
 
-def _paired_by_contact(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: Numbers) -> Mask:
-    """Return the mask (m,) of nodes in group `nodes_of` whose facets, with `corners` (m, n_corners), are in `facets_of`."""
-    on_side, on_opposite = np.zeros((2, mesh.n_points), bool)
-    on_side[mesh.points_of(nodes_of)] = True
-    on_opposite[mesh.points_of(facets_of)] = True
-    return np.asarray(on_side[node] & (on_opposite[corners] | (corners < 0)).all(axis=1))
+def _paired_by_contact(mesh: Mesh, node_group: str, facet_group: str, node: Indices, corners: Numbers) -> Mask:
+    """Return the mask (m,) of nodes of `node_group` on facets of `facet_group`, which have the `corners` (m, n_corners)."""
+    in_node_group, in_facet_group = np.zeros((2, mesh.n_points), bool)
+    in_node_group[mesh.points_of(node_group)] = True
+    in_facet_group[mesh.points_of(facet_group)] = True
+    return np.asarray(in_node_group[node] & (in_facet_group[corners] | (corners < 0)).all(axis=1))
 
 
 def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
@@ -84,19 +84,19 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     outer = _outer_facets(mesh)
     outward = np.zeros(mesh.points.shape)
     for column in outer.nodes.T:
-        used = column >= 0
-        np.add.at(outward, column[used], outer.normal[used])
+        is_node = column >= 0
+        np.add.at(outward, column[is_node], outer.normal[is_node])
     length = np.linalg.norm(outward, axis=1)
     outward /= np.where(length > 0.0, length, 1.0)[:, None]
-    reach = ON_ARC * outer.size + outer.rise
+    largest_height = ON_ARC * outer.size + outer.rise
     nodes = np.flatnonzero(length > 0.0)
     radius = np.linalg.norm(mesh.points[outer.corners] - outer.centre[:, None], axis=2).max(axis=1)
-    near, facet = pairs_within(mesh.points[nodes], outer.centre, radius + 2.0 * reach)
-    node = nodes[near]
+    index, facet = pairs_within(mesh.points[nodes], outer.centre, radius + 2.0 * largest_height)
+    node = nodes[index]
     height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
-    facing = np.einsum("md,md->m", outer.normal[facet], outward[node]) <= -0.5
-    facing &= (np.abs(height) <= reach[facet]) & (outer.nodes[facet] != node[:, None]).all(axis=1)
-    node, facet = node[facing], facet[facing]
+    is_opposite = np.einsum("md,md->m", outer.normal[facet], outward[node]) <= -0.5
+    is_opposite &= (np.abs(height) <= largest_height[facet]) & (outer.nodes[facet] != node[:, None]).all(axis=1)
+    node, facet = node[is_opposite], facet[is_opposite]
     order = np.lexsort((facet, node))
     node, facet = node[order], facet[order]
     _, body = bodies(mesh)
@@ -138,11 +138,11 @@ def _share_cells(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) 
     cells of the two meshes share no facet, or only the corners of the given facet.
     """
     corners = outer.corners[facet]
-    involved = np.zeros(mesh.n_points, bool)
-    involved[node], involved[corners] = True, True
+    is_involved = np.zeros(mesh.n_points, bool)
+    is_involved[node], is_involved[corners] = True, True
     cells: dict[int, list[tuple[frozenset[int], str]]] = {}
     for name, block in mesh.solids.items() if len(node) else ():
-        for nodes in block[involved[block].any(axis=1)].tolist():
+        for nodes in block[is_involved[block].any(axis=1)].tolist():
             key = frozenset(nodes[: elements.get(name).n_corners]), name
             for number in nodes:
                 cells.setdefault(number, []).append(key)

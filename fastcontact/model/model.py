@@ -16,6 +16,7 @@ from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ModelError
 from fastcontact.heat.loads import TemporaryHeat
+from fastcontact.model import rigid_motions
 from fastcontact.model.checks import check_motions, check_overlap, check_penetration, check_ramps, check_supports
 from fastcontact.model.contact_pair import check_rotations
 from fastcontact.model.description import sentences
@@ -23,7 +24,7 @@ from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
-from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, cone_rows, free_motions, generalised, mechanisms
+from fastcontact.model.rigid_motions import FreeMotions, cone_rows, free_motions, generalised_forces, mechanisms
 
 # Types of items that may act in only some of the load steps.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
@@ -152,7 +153,7 @@ class Model(ModelSupports, metaclass=_PublicNames):
         self._log_axis()
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
-        self._check_each_set(self._check_heat_of)
+        self._check_each_temporary_set(self._check_heat_of)
         if ramp is not None:
             items: list[Any] = [*self.supports, *self.loads, *self.relations]
             items += [*self.temperatures, *self.initial_states, *self.heat_loads]
@@ -175,15 +176,15 @@ class Model(ModelSupports, metaclass=_PublicNames):
         sides = [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         check_overlap(self.mesh, self.kinematics, sides)
         nodal_forces = list(self.force_driven.forces(forces).values())
-        self._check_each_set(lambda model: model._check_motions(fixed, nodal_forces))
+        self._check_each_temporary_set(lambda model: model._check_motions(fixed, nodal_forces))
 
-    def _check_each_set(self, check: Callable[[Model], None]) -> None:
+    def _check_each_temporary_set(self, check: Callable[[Model], None]) -> None:
         """Call `check` once for every set of temporary items that act together, with a model that has no other such items."""
         temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
         starts = {0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)}
         for begin in sorted(starts):
             try:
-                check(self._model_from(begin))
+                check(self._model_of_step(begin))
             except ModelError as error:
                 raise ModelError(f"in the load steps after {begin:g}: {error}" if begin else str(error)) from None
 
@@ -195,11 +196,11 @@ class Model(ModelSupports, metaclass=_PublicNames):
                 "no heat load acts, so the temperatures are undetermined: add a film condition (convection)"
             )
 
-    def _model_from(self, begin: float) -> Model:
+    def _model_of_step(self, begin: float) -> Model:
         """Return a copy of the model with only the items that act in the load step that begins at the load factor `begin`."""
         model = copy.copy(self)
         model.relations = [r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)]
-        model.heat_loads = [r for r in self.heat_loads if not isinstance(r, TemporaryHeat) or r.acts_from(begin)]
+        model.heat_loads = [h for h in self.heat_loads if not isinstance(h, TemporaryHeat) or h.acts_from(begin)]
         return model
 
     def _check_relations(self, fixed: Mask, prescribed: Mapping[PartHistory, Array], ramp: Ramp) -> None:
@@ -221,10 +222,10 @@ class Model(ModelSupports, metaclass=_PublicNames):
         motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.constraint_rows()))
         if not len(motions):
             return
-        generalised_forces = [generalised(motions, force.ravel()) for force in forces]
+        works = [generalised_forces(motions, force.ravel()) for force in forces]
         # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
-        gaps = gap_changes(self, motions, MOST_FRICTION)
-        check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(generalised_forces, (-1, len(motions))))))
+        gaps = gap_changes(self, motions, rigid_motions.LARGEST_FRICTION_FACTOR)
+        check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(works, (-1, len(motions))))))
 
 
 def gap_changes(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:

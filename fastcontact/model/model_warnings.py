@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact._jit.parallel import on_one_blas_thread
 from fastcontact._tools.neighbours import close_pairs
-from fastcontact._tools.units import in_si, inconsistency_message
+from fastcontact._tools.units import inconsistency_message, si_value
 from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.energy import gradients_at, integration_rule
 from fastcontact.elasticity.loads import LOAD_POINTS, BodyForce, Load, Pressure, Traction, Value, evaluated
@@ -41,7 +41,7 @@ PLAUSIBLE_STRAIN = (1e-12, 1.0)
 # Young's moduli of solids, from aerogel to diamond [Pa].
 SOLIDS = (1e2, 2e12)
 # Approximate number of cells on which quadrature errors are estimated.
-SAMPLE = 1000
+N_SAMPLE_CELLS = 1000
 # Relative quadrature errors above which a warning is given: of a load, and of the stiffness (1.6 % on regular pyramids).
 LARGEST_LOAD_ERROR, LARGEST_STIFFNESS_ERROR = 1e-3, 5e-2
 # Two nodes are assumed to be meant to coincide if their distance is below this fraction of the adjacent edges and below
@@ -62,7 +62,7 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     texts = [*_moduli(model), *_units(model), *_proportions(model, float(motion.max())), poorest_cell(model.mesh)]
     texts += [hanging_nodes_warning(model), _close_nodes(model), *_friction(model), *_penetration(model, pairs, motion)]
     texts += [*_missing_ramps(model, ramp), *prescribed_overlap_warnings(pairs, supports), *_loads_on_supports(model)]
-    texts += [*split_side_warnings(pairs), *_sector_ends(model), *_shared_fluids(model), _stiffness(model.mesh)]
+    texts += [*split_side_warnings(pairs), *_sector_ends(model), *_shared_fluids(model), _quadrature(model.mesh)]
     texts += [text for load in model.loads for text in _load_quadrature(model, load)]
     return [text for text in texts if text]
 
@@ -107,7 +107,7 @@ def _units(model: Model) -> Iterator[str]:
     """Yield warnings if the named units are inconsistent, or if a modulus is implausible for a solid in these units."""
     units = model.units
     yield inconsistency_message(units)
-    pascal = in_si(units, "pressure")
+    pascal = si_value(units, "pressure")
     if pascal is None:
         return
     for material, groups in model.materials:
@@ -145,7 +145,7 @@ def _largest_motion(supports: Supports) -> Array:
 
     Rotations are left out.
     """
-    translations = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}
+    translations = {ramp: values for ramp, values in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}
     peaks = [_peak(ramp) * np.abs(values).max(axis=0) for ramp, values in translations.items() if len(values)]
     return np.max([np.zeros(supports.fixed.shape[1]), *peaks], axis=0)
 
@@ -172,17 +172,17 @@ def _close_nodes(model: Model) -> str:
     numbers = np.flatnonzero(unconnected)
     pairs = numbers[close_pairs(mesh.points[numbers], SINGLE_PRECISION * size)]
     distance = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
-    near = distance < NEAR * edge[pairs].min(axis=1)
-    pairs, distance = pairs[near], distance[near]
+    is_close = distance < NEAR * edge[pairs].min(axis=1)
+    pairs, distance = pairs[is_close], distance[is_close]
     count = len(np.unique(pairs[:, 1]))
     if count < mesh.dim:  # bodies that touch only at a corner
         return ""
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(distance.max())
-    relation = "coincide with" if largest <= LENGTH_ROUND_OFF * size else f"lie within {largest:.3g} of"
+    predicate = "coincide with" if largest <= LENGTH_ROUND_OFF * size else f"lie within {largest:.3g} of"
     return (
-        f"{count} nodes {relation} another node, and no contact joins them (first: points {first[0]} and {first[1]} at "
+        f"{count} nodes {predicate} another node, and no contact joins them (first: points {first[0]} and {first[1]} at "
         f"({point})): merge them in the mesher or with generate.transform.merge_points, or define the contact"
     )
 
@@ -223,11 +223,11 @@ def _penetration(model: Model, pairs: Pairs, prescribed: Array) -> Iterator[str]
         row = int(np.argmin(gap + approach))
         if -gap[row] > approach[row]:
             point = bound.secondary.points[row]
-            driver = "supports push" if motion is prescribed else "motions push"
+            cause = "supports push" if motion is prescribed else "motions push"
             yield (
                 f"contact '{pair.name}' begins with a penetration of {-gap[row]:.4g} at point {point} "
                 f"{np.array2string(model.mesh.points[point], precision=4)}, more than the {np.abs(normal[row]) @ motion:.4g} "
-                f"that {driver} along its normal: the contact forces are due to this penetration. Separate the bodies, or "
+                f"that {cause} along its normal: the contact forces are due to this penetration. Separate the bodies, or "
                 "specify an intended interference as a clearance"
             )
 
@@ -256,7 +256,7 @@ def _missing_ramps(model: Model, ramp: Ramp) -> Iterator[str]:
 
 
 @cached_by_mesh
-def _stiffness(mesh: Mesh) -> str:
+def _quadrature(mesh: Mesh) -> str:
     """Return a warning if the quadrature of the stiffness is inexact on curved or distorted cells.
 
     The measure is the trace of the stiffness of a scalar field, the integral of all squared gradients of shape functions.
@@ -284,8 +284,8 @@ def _traces(nodes: Array, element: Element, xi: Array, weights: Array) -> Array:
 
 
 def _sample(cells: AnyArray) -> AnyArray:
-    """Return one to two times SAMPLE evenly distributed cells, or all if there are fewer."""
-    return cells[:: max(1, len(cells) // SAMPLE)]
+    """Return one to two times N_SAMPLE_CELLS evenly distributed cells, or all if there are fewer."""
+    return cells[:: max(1, len(cells) // N_SAMPLE_CELLS)]
 
 
 def _load_quadrature(model: Model, load: Load) -> Iterator[str]:

@@ -117,8 +117,8 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     exclusive = ("adhesion", "friction", "penalty", "tangential_penalty", "wear")
     excess = [option for option in exclusive if option in options and option != laws[0]]
     if excess or options.get("kind", "unilateral") != "unilateral":
-        other = (excess or ["kind"])[0]
-        raise ContactError(f"contact '{name}' has {laws[0]}, which excludes {other}: leave out one of the two")
+        conflict = (excess or ["kind"])[0]
+        raise ContactError(f"contact '{name}' has {laws[0]}, which excludes {conflict}: leave out one of the two")
     option, constants = laws[0], options[laws[0]]
     required, optional = LAWS[option]
     if not isinstance(constants, Mapping) or not set(required) <= set(constants):
@@ -162,7 +162,7 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
         )
     if kind != "unilateral" and "wear" in options:
         raise ContactError(f"contact '{name}' is {kind}, which does not wear: leave out 'wear' or 'kind'")
-    excess = [name for name in ("clearance", "clearance_primary", "penalty", "search_distance") if name in options]
+    excess = [key for key in ("clearance", "clearance_primary", "penalty", "search_distance") if key in options]
     if kind == "tied" and excess:
         raise ContactError(f"contact '{name}' is tied, which keeps the initial gaps exactly: leave out '{excess[0]}'")
     return str(kind)

@@ -13,14 +13,14 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.contact.projection import Closest, closest_of_kinds, places
+from fastcontact.contact.projection import Closest, closest_of_types, facet_points
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, shapes_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
-from fastcontact.model.relation_rows import coincident, matching_nodes, relative_to_first, vectors_to_facets
+from fastcontact.model.relation_rows import coincident_nodes, matching_nodes, relative_to_first, vectors_to_facets
 from fastcontact.round_off import ROUND_OFF
 
 # Largest distance, relative to facet size, by which a rotated node of one end may deviate from the facets of the other
@@ -130,11 +130,11 @@ def cyclic(
         (_motion(rotation, sign) for sign in (1.0, -1.0)),
         key=lambda motion: float(nearest(mesh.points[second], mesh.points[first] @ motion[0].T + motion[1])[0].max()),
     )
-    match, distance, tolerance = coincident(mesh, (ends[0], first), (ends[1], second), turn, shift)
+    match, distance, tolerance = coincident_nodes(mesh, (ends[0], first), (ends[1], second), turn, shift)
     worst = int(np.argmax(distance))
-    same = distance <= tolerance
-    interface = PeriodicInterface(first[same], second[match[same]], turn, rotation, sectors)
-    if len(first) == len(second) == len(np.unique(match)) and same.all():
+    is_matched = distance <= tolerance
+    interface = PeriodicInterface(first[is_matched], second[match[is_matched]], turn, rotation, sectors)
+    if len(first) == len(second) == len(np.unique(match)) and is_matched.all():
         relation = MultiPointConstraint(name, turned_rows(interface, 1.0, mesh))
         return [relation], interface._replace(relation=relation)
     dependent, facets = (ends[0], ends[1]) if len(first) >= len(second) else (ends[1], ends[0])
@@ -164,14 +164,14 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
 
     Returns None if the rotated nodes do not lie on these facets. Linear fields satisfy the rows exactly.
     """
-    other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
+    side, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
     turn, shift = _motion(rotation, sign)
-    nodes_by_type = other.node_positions(mesh.points)
-    near = _closest(mesh.points[nodes] @ turn.T + shift, vectors_to_facets(mesh, nodes) @ turn.T, other, nodes_by_type)
+    nodes_by_type = side.node_positions(mesh.points)
+    near = _closest(mesh.points[nodes] @ turn.T + shift, vectors_to_facets(mesh, nodes) @ turn.T, side, nodes_by_type)
     sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in nodes_by_type])
     if (near.distance > LARGEST_DISTANCE * sizes[near.facet]).any() or (near.overhang > LARGEST_DISTANCE).any():
         return None
-    projected = places(other, near.facet, near.xi)
+    projected = facet_points(side, near.facet, near.xi)
     m, dim, n = len(nodes), mesh.dim, mesh.n_points
     weights, identity = shapes_at(projected.shape, projected.nodes, n), shapes_at(np.ones((m, 1)), nodes[:, None], n)
     return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))
@@ -183,18 +183,20 @@ def _motion(rotation: Rotation, sign: float) -> tuple[Array, Array]:
     return turn, centre - turn @ centre
 
 
-def _closest(positions: Array, inward: Array, other: Surface, nodes_by_type: list[Array]) -> Closest:
-    """Return the projections of positions (n, dim) [length] on the closest facets of a surface with nodes at `corners`.
+def _closest(positions: Array, inward: Array, facets: Surface, nodes_by_type: list[Array]) -> Closest:
+    """Return the projections of positions (n, dim) [length] on the closest facets of a surface.
+
+    `nodes_by_type` are the node positions (m, n_nodes, dim) of its facets [length], see `Surface.node_positions`.
 
     Where two bodies are in contact, a position lies on facets of both. It is assigned to the body into which `inward`
     (n, dim) points.
     """
-    near, inside = (closest_of_kinds(positions + shift, nodes_by_type) for shift in (0.0, LARGEST_DISTANCE * inward))
-    nodes, nodes_inside = (places(other, closest.facet, closest.xi).nodes for closest in (near, inside))
+    near, inside = (closest_of_types(positions + shift, nodes_by_type) for shift in (0.0, LARGEST_DISTANCE * inward))
+    nodes, nodes_inside = (facet_points(facets, closest.facet, closest.xi).nodes for closest in (near, inside))
     first_facet = np.cumsum([0] + [len(block) for block in nodes_by_type])
     for row in np.flatnonzero((nodes[:, :, None] != nodes_inside[:, None]).all(axis=(1, 2))):
         kind = int(np.searchsorted(first_facet, inside.facet[row], side="right")) - 1
-        on_facet = closest_of_kinds(positions[[row]], [nodes_by_type[kind][[inside.facet[row] - first_facet[kind]]]])
+        on_facet = closest_of_types(positions[[row]], [nodes_by_type[kind][[inside.facet[row] - first_facet[kind]]]])
         for values, value in zip(near, on_facet, strict=True):
             values[row] = value[0]
         near.facet[row] = inside.facet[row]

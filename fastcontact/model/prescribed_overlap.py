@@ -87,9 +87,9 @@ def _summary(contact: ContactPair, formulation: Formulation, overlap: Overlap) -
     """Return the first part of a message: the number of nodes, the sides and the largest depth."""
     position = ", ".join(f"{x:.6g}" for x in formulation.points[overlap.point])
     preposition = "off" if formulation.options.kind in ALWAYS_CLOSED else "into"
-    other = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"
+    side = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"
     return (
-        f"supports push {overlap.count} of the {overlap.total} nodes of '{contact.secondary}' {preposition} {other}, contact "
+        f"supports push {overlap.count} of the {overlap.total} nodes of '{contact.secondary}' {preposition} {side}, contact "
         f"'{contact.name}', by up to {overlap.depth:.4g} (point {overlap.point} at ({position}), instant {overlap.instant:g})"
     )
 
@@ -98,12 +98,12 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
     """Yield each pair with inadmissible overlap, its formulation, and its overlap at the instant of the largest depth."""
     for contact, formulation in pairs:
         side = formulation.secondary
-        usable = side.points[~formulation.excluded[side.points]]
-        nodes = usable[supports.fixed[usable].any(axis=1)]
+        contact_nodes = side.points[~formulation.excluded[side.points]]
+        nodes = contact_nodes[supports.fixed[contact_nodes].any(axis=1)]
         if not len(nodes) or contact.force or formulation.options.penalty is not None:
             continue
         # Nodes without supports are included in the total, whether they face the other side or not.
-        unsupported = len(usable) - len(nodes)
+        unsupported = len(contact_nodes) - len(nodes)
         candidates = Candidates.at(nodes)
         undeformed = Configuration.undeformed(formulation.points)
         gap0, _, _ = _gaps(formulation, candidates, undeformed, with_clearance=False)
@@ -147,7 +147,7 @@ def _depths(
         depth = np.abs(gap) - np.abs(gap0)
     else:
         depth = -gap - np.maximum(-gap0, 0.0)
-    return np.where(paired & _determined(rows, fixed), np.maximum(depth, 0.0), 0.0), paired
+    return np.where(paired & _determined_by_supports(rows, fixed), np.maximum(depth, 0.0), 0.0), paired
 
 
 def _gaps(
@@ -169,11 +169,11 @@ def _jumps(formulation: Formulation, candidates: Candidates, displacement: Array
     for axis in np.eye(fixed.shape[1]):
         direction = np.broadcast_to(axis, pairing.normal.shape)
         rows = rows_along(direction, candidates, pairing, formulation.primary, fixed.size)
-        square += np.where(_determined(rows, fixed), rows @ displacement.ravel(), 0.0) ** 2
+        square += np.where(_determined_by_supports(rows, fixed), rows @ displacement.ravel(), 0.0) ** 2
     return np.sqrt(square), pairing.paired
 
 
-def _determined(rows: csr_array, fixed: Mask) -> Mask:
+def _determined_by_supports(rows: csr_array, fixed: Mask) -> Mask:
     """Return whether each of the rows (m, n_dofs) depends only on supported components."""
     free = np.abs(rows.data) > ZERO_COEFFICIENT
     free &= ~fixed.ravel()[rows.indices]

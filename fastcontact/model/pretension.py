@@ -125,9 +125,9 @@ class PretensionForce(Load):
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         section = self.section
-        share = section.force / len(section.nodes) * section.normal
-        forces[section.nodes] += share
-        forces[section.opposite] -= share
+        nodal_force = section.force / len(section.nodes) * section.normal
+        forces[section.nodes] += nodal_force
+        forces[section.opposite] -= nodal_force
 
 
 def pretension(
@@ -156,28 +156,28 @@ def pretension(
         raise ModelError(f"{name} needs either a force or a shortening")
     if shortening is not None and locked_from is not None:
         raise ModelError(f"{name} has a prescribed shortening: locked_from applies to a force only")
-    for name_of_value, value in (("force", force), ("shortening", shortening), ("locked_from", locked_from)):
+    for quantity, value in (("force", force), ("shortening", shortening), ("locked_from", locked_from)):
         if value is not None:
-            check_number(f"the {name_of_value} of {name}", value)
+            check_number(f"the {quantity} of {name}", value)
     nodes, opposite_nodes = _sides(mesh, name, section, opposite)
-    direction = _outward(mesh, name, section, _normal(mesh, name, nodes, normal))
+    direction = _outward_direction(mesh, name, section, _normal(mesh, name, nodes, normal))
     return Pretension(label, nodes, opposite_nodes, direction, force or 0.0, shortening, locked_from, ramp)
 
 
 def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[Indices, Indices]:
     """Return the points (m,) of a section, and the coincident points (m,) of the opposite side."""
-    other = section + OPPOSITE if opposite is None else opposite
+    group = section + OPPOSITE if opposite is None else opposite
     nodes = mesh.points_of(section).astype(np.intp)
-    if opposite is None and other not in mesh.group_names:
+    if opposite is None and group not in mesh.group_names:
         raise ModelError(
-            f"{name}: the mesh is not cut along '{section}', since there is no group '{other}': build the model on "
+            f"{name}: the mesh is not cut along '{section}', since there is no group '{group}': build the model on "
             f"fc.generate.cut(mesh, '{section}'), or name the opposite side"
         )
-    opposite_nodes = mesh.points_of(other).astype(np.intp)
+    opposite_nodes = mesh.points_of(group).astype(np.intp)
     shared = np.intersect1d(nodes, opposite_nodes)
     if len(shared):
-        raise ModelError(f"{name}: '{section}' and '{other}' share point {shared[0]}: the sides need separate nodes")
-    match = matching_nodes(mesh, (section, nodes), (other, opposite_nodes), [0.0] * mesh.dim)
+        raise ModelError(f"{name}: '{section}' and '{group}' share point {shared[0]}: the sides need separate nodes")
+    match = matching_nodes(mesh, (section, nodes), (group, opposite_nodes), [0.0] * mesh.dim)
     return nodes, opposite_nodes[match]
 
 
@@ -196,7 +196,7 @@ def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | Non
     return np.asarray(np.where(np.abs(vector) < ROUND_OFF, 0.0, vector))
 
 
-def _outward(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
+def _outward_direction(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
     """Return `direction` or its opposite (dim,), whichever points out of the body at the section, towards the other side.
 
     Sections that are not groups of facets keep the direction.

@@ -137,8 +137,8 @@ class Ramp:
             raise ModelError(f"the instants of the ramp must ascend, not {self.instants}")
         outside = instants[(instants < times[0]) | (instants > times[-1])]
         if len(outside):
-            covered = f"{times[0]:g} to {times[-1]:g}"
-            raise ModelError(f"instant {outside[0]:g} lies outside the table of the ramp, which covers {covered}")
+            range_text = f"{times[0]:g} to {times[-1]:g}"
+            raise ModelError(f"instant {outside[0]:g} lies outside the table of the ramp, which covers {range_text}")
         object.__setattr__(self, "instants", tuple(float(t) for t in instants))
         object.__setattr__(self, "table", table)
 

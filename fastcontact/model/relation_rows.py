@@ -80,7 +80,7 @@ def matching_nodes(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation:
         shift = finite_vector(translation, mesh.dim)
     if shift is None:
         raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
-    rows, distance, tolerance = coincident(mesh, first, second, np.eye(mesh.dim), shift)
+    rows, distance, tolerance = coincident_nodes(mesh, first, second, np.eye(mesh.dim), shift)
     worst, requirement = int(np.argmax(distance)), "groups are joined node by node"
     if distance[worst] > tolerance:
         raise ModelError(
@@ -100,7 +100,7 @@ class Coincident(NamedTuple):
     tolerance: float  # largest distance of coincident nodes [length]
 
 
-def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shift: Array) -> Coincident:
+def coincident_nodes(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shift: Array) -> Coincident:
     """Return the nodes of the second group that coincide with those of the first, rotated by `turn` and moved by `shift`.
 
     Each group is given as (name, nodes). Several nodes of a group may have the same position, for example on bodies in
@@ -114,6 +114,7 @@ def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shi
     """
     (name, nodes), (other, opposite) = first, second
     x, target = mesh.points[nodes] @ turn.T + shift, mesh.points[opposite]
+    # The size of the mesh replaces that of a small group, such as a single node.
     size = max(float(np.ptp(x, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
     tolerance = SINGLE_PRECISION * size
     distance, rows = nearest(target, x)
@@ -121,13 +122,14 @@ def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shi
     if len(row) > len(np.unique(row)):
         body = bodies(mesh)[1]
         deviation = vectors_to_facets(mesh, nodes)[row] @ turn.T - vectors_to_facets(mesh, opposite)[candidate]
-        other_body = body[nodes[row]] != body[opposite[candidate]]
-        mismatch = np.linalg.norm(deviation, axis=1) + 4.0 * tolerance * other_body
+        on_different_bodies = body[nodes[row]] != body[opposite[candidate]]
+        # If facets deviate equally, within round-off, a node of the same body is preferred.
+        mismatch = np.linalg.norm(deviation, axis=1) + 4.0 * tolerance * on_different_bodies
         order = np.lexsort((mismatch, row))
         candidate, row, mismatch = candidate[order], row[order], mismatch[order]
-        best = np.insert(np.diff(row) > 0, 0, True)
-        rows[row[best]] = candidate[best]
-        ambiguous = np.flatnonzero(~best[1:] & best[:-1] & (np.diff(mismatch) <= tolerance))
+        is_best = np.insert(np.diff(row) > 0, 0, True)
+        rows[row[is_best]] = candidate[is_best]
+        ambiguous = np.flatnonzero(~is_best[1:] & is_best[:-1] & (np.diff(mismatch) <= tolerance))
         if len(ambiguous):
             node, pair = nodes[row[ambiguous[0]]], opposite[candidate[ambiguous[0] : ambiguous[0] + 2]]
             raise ModelError(

@@ -37,7 +37,7 @@ EDGES = 8
 # Fraction of the frictional capacity above which floating bodies are reported as about to slide.
 NEARLY_SLIDING = 0.9
 # Largest factor by which the coefficients of friction are multiplied to test whether friction can hold a body.
-MOST_FRICTION = 100.0
+LARGEST_FRICTION_FACTOR = 100.0
 # Largest number of motions of parts between hinges. A mesh with more motions is defective.
 MOST_MOTIONS = 1500
 
@@ -56,12 +56,12 @@ class FreeMotions:
     """Independent rigid-body motions that supports and constraints allow.
 
     Column j of `displacement` (n_dofs, k) contains the displacements of all points in motion j; its largest entry is about 1.
-    `parts` (p, k) are the coefficients of the motions as combinations of elementary ones, and `labels` the names of the p
-    elementary motions. `hinges` (m,) are single or collinear nodes that connect parts of bodies.
+    `weights` (p, k) are the coefficients of the motions as combinations of p elementary motions, which `labels` names.
+    `hinges` (m,) are single or collinear nodes that connect parts of bodies.
     """
 
     displacement: Array
-    parts: Array
+    weights: Array
     labels: list[Label]
     hinges: Indices = field(default_factory=lambda: np.empty(0, np.intp))
 
@@ -70,7 +70,7 @@ class FreeMotions:
 
     def combined(self, coefficients: Array) -> FreeMotions:
         """Return the motions ``displacement @ coefficients``, coefficients (k, j)."""
-        return replace(self, displacement=self.displacement @ coefficients, parts=self.parts @ coefficients)
+        return replace(self, displacement=self.displacement @ coefficients, weights=self.weights @ coefficients)
 
     def with_translations(self, dofs: Indices, labels: Sequence[Label], n_dofs: int) -> FreeMotions:
         """Return these motions, and a unit displacement along each of the components `dofs` (j,) of `n_dofs`."""
@@ -78,8 +78,8 @@ class FreeMotions:
         displacement = np.zeros((n_dofs, k + j))
         displacement[: len(self.displacement), :k] = self.displacement
         displacement[dofs, k + np.arange(j)] = 1.0
-        parts = np.asarray(block_diag(self.parts, np.eye(j)), float)
-        return FreeMotions(displacement, parts, [*self.labels, *labels], self.hinges)
+        weights = np.asarray(block_diag(self.weights, np.eye(j)), float)
+        return FreeMotions(displacement, weights, [*self.labels, *labels], self.hinges)
 
     def names(self) -> list[str]:
         """Return the motions of all bodies, each with the name of its body; see `by_body`."""
@@ -91,7 +91,7 @@ class FreeMotions:
         The motions are combined such that each contains as few elementary motions as possible.
         """
         by_body: dict[str, list[str]] = {}
-        for column in _column_echelon_form(self.parts).T:
+        for column in _column_echelon_form(self.weights).T:
             rows_of_body: dict[str, list[int]] = {}
             for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()).tolist():
                 rows_of_body.setdefault(self.labels[i].body, []).append(i)
@@ -119,7 +119,7 @@ class FreeMotions:
         return f"rotation about {position}" if len(centre) == 2 else f"rotation about the line through {position}{line}"
 
 
-def grouped(names: Iterable[str]) -> str:
+def grouped_by_body(names: Iterable[str]) -> str:
     """Return the `names` of motions, see `FreeMotions.names`, in one string that names each body once."""
     by_body: dict[str, list[str]] = {}
     for body, _, motion in (name.rpartition(": ") for name in names):
@@ -202,7 +202,7 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
 def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     """Return the motions of bodies, and of their parts between hinges, that the supports `fixed` (n_points, dim) allow."""
     rigid = _parts_of(mesh, kinematics)
-    moving: list[tuple[Indices, Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
+    part_motions: list[tuple[Indices, Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
     matrices, labels = [np.empty((0, 0))], []
     for number in range(rigid.count):
         members = rigid.nodes_of(number)
@@ -210,7 +210,7 @@ def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
         arms = np.abs(modes).max(axis=0)
         modes = modes / arms
         free = _null_space(modes[fixed[members].ravel()])  # combinations of the modes without displacement at supports
-        moving.append((members, (modes @ free).reshape(len(members), mesh.dim, -1)))
+        part_motions.append((members, (modes @ free).reshape(len(members), mesh.dim, -1)))
         if free.shape[1]:
             matrices.append(free)
             name, centre = _part_name(mesh, rigid, number), mesh.points[members].mean(axis=0)
@@ -218,10 +218,10 @@ def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
                 Label(name, motion, centre if motion.startswith("rotation") else None, float(arm))
                 for motion, arm in zip(MODE_NAMES[kinematics], arms, strict=True)
             ]
-    joint = _joint_motions(mesh, rigid, moving)
-    coefficients = np.split(joint, np.cumsum([motion.shape[2] for _, motion in moving]))
+    joint = _joint_motions(mesh, rigid, part_motions)
+    coefficients = np.split(joint, np.cumsum([motion.shape[2] for _, motion in part_motions]))
     displacement = np.zeros((mesh.n_points, mesh.dim, joint.shape[1]))
-    for number, ((members, motion), weights) in enumerate(zip(moving, coefficients[:-1], strict=True)):
+    for number, ((members, motion), weights) in enumerate(zip(part_motions, coefficients[:-1], strict=True)):
         in_part = rigid.part[members] == number  # a node at a hinge belongs to several parts
         displacement[members[in_part]] = motion[in_part] @ weights
     return FreeMotions(
@@ -239,9 +239,9 @@ def _parts_of(mesh: Mesh, kinematics: str) -> RigidParts:
     return RigidParts(count, body.astype(np.intp), np.empty(0, np.intp), np.empty(0, np.intp))
 
 
-def _joint_motions(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Array]]) -> Array:
+def _joint_motions(mesh: Mesh, rigid: RigidParts, part_motions: list[tuple[Indices, Array]]) -> Array:
     """Return the combinations (k, j) of the motions of all parts for which the parts remain connected at hinges."""
-    width = sum(motion.shape[2] for _, motion in moving)
+    width = sum(motion.shape[2] for _, motion in part_motions)
     if not len(rigid.hinge_node):
         return np.eye(width)
     if width > MOST_MOTIONS:
@@ -249,13 +249,13 @@ def _joint_motions(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Ar
             f"the mesh consists of {rigid.count} parts that are connected only at single nodes or along lines (first: "
             f"{node_at(mesh, rigid.hinge_node[0])}): let cells share whole facets"
         )
-    ends = np.cumsum([0] + [motion.shape[2] for _, motion in moving])
+    ends = np.cumsum([0] + [motion.shape[2] for _, motion in part_motions])
     at_hinges = np.zeros((len(rigid.hinge_node), mesh.dim, width))
     for row, (node, number) in enumerate(zip(rigid.hinge_node, rigid.hinge_part, strict=True)):
-        members, motion = moving[number]
+        members, motion = part_motions[number]
         at_hinges[row, :, ends[number] : ends[number + 1]] = motion[np.searchsorted(members, node)]
-    same = rigid.hinge_node[1:] == rigid.hinge_node[:-1]
-    return _null_space((at_hinges[1:] - at_hinges[:-1])[same].reshape(int(same.sum()) * mesh.dim, width))
+    same_node = rigid.hinge_node[1:] == rigid.hinge_node[:-1]
+    return _null_space((at_hinges[1:] - at_hinges[:-1])[same_node].reshape(int(same_node.sum()) * mesh.dim, width))
 
 
 def node_at(mesh: Mesh, node: int) -> str:
@@ -309,7 +309,7 @@ def _edges(constraints: Constraints, factor: float) -> tuple[csr_array, Array]:
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 
-def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Array:
+def generalised_forces(motions: FreeMotions, force: Array, largest: float = 0.0) -> Array:
     """Return the generalised forces (k,) of nodal forces (n_dofs,) on each motion, with round-off set to zero [force].
 
     Round-off is estimated from these forces and from the `largest` earlier generalised forces (k,), since the forces may be
@@ -334,16 +334,16 @@ def mechanisms(gaps: Array, works: Array) -> Array:
     if without_gap_change.shape[1]:
         return without_gap_change
     scale = np.abs(works).max(axis=1, initial=0.0)
-    driven = works[scale > 0] / scale[scale > 0, None]
+    scaled_works = works[scale > 0] / scale[scale > 0, None]
     for axis in range(k):
         for sign in (1.0, -1.0):
-            motion = _extreme(sign * np.eye(k)[axis], gaps, np.zeros(len(gaps)), driven, 1.0)
+            motion = _maximiser(sign * np.eye(k)[axis], gaps, np.zeros(len(gaps)), scaled_works, 1.0)
             if np.abs(motion).max(initial=0.0) > 1e-6:
                 return motion[:, None]
     return np.empty((k, 0))
 
 
-def least_held(motions: FreeMotions, gaps: Array) -> tuple[str, float]:
+def least_restrained(motions: FreeMotions, gaps: Array) -> tuple[str, float]:
     """Return the name of the motion that changes the gaps least, and the ratio of its change to the largest one [-].
 
     `gaps` (m, k) are the changes of m gaps for each of the k motions.
@@ -366,17 +366,17 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
     size : float
         Size of the model [length].
     """
-    stop = _farthest(gaps, gap, work, size)
+    stop = _relative_amplitudes(gaps, gap, work, size)
     return None if np.abs(stop).max() > 0.99 * FAR else stop * size
 
 
-def _farthest(gaps: Array, gap: Array, work: Array, size: float) -> Array:
+def _relative_amplitudes(gaps: Array, gap: Array, work: Array, size: float) -> Array:
     """Return the amplitudes of `stopped_at` relative to `size`, which are at most FAR [-]."""
     if not work.any():
         return np.zeros(len(work))
     rows = np.abs(gaps).max(axis=1, initial=0.0) > ZERO
-    open_by = np.maximum(gap[rows], 0.0) / size
-    return _extreme(work / np.abs(work).max(), gaps[rows], open_by, np.empty((0, len(work))), FAR)
+    relative_gap = np.maximum(gap[rows], 0.0) / size
+    return _maximiser(work / np.abs(work).max(), gaps[rows], relative_gap, np.empty((0, len(work))), FAR)
 
 
 def needed_friction(
@@ -385,16 +385,17 @@ def needed_friction(
     """Return the smallest multiplier of the coefficients of friction for which rigid bodies stop [-], and the sliding bodies.
 
     Returns None if a factor of NEARLY_SLIDING suffices even with the pyramid inscribed in Coulomb's cone, or if no factor up
-    to MOST_FRICTION suffices. `u` (n_dofs,) are the displacements [length]; `work` and `size` are as in `stopped_at`.
+    to LARGEST_FRICTION_FACTOR suffices. `u` (n_dofs,) are the displacements [length]; for `work` and `size` see
+    `stopped_at`.
     """
     if not constraints.friction.any():
         return None
     inscribed = 1.0 if len(constraints.tangents) == 1 else np.cos(np.pi / EDGES)
-    low, high = NEARLY_SLIDING * inscribed, MOST_FRICTION
+    low, high = NEARLY_SLIDING * inscribed, LARGEST_FRICTION_FACTOR
 
     def slide(factor: float) -> Array:
         rows, gap0 = cone_rows(constraints, factor)
-        stop = _farthest(rows @ motions.displacement, gap0 + rows @ u, work, size)
+        stop = _relative_amplitudes(rows @ motions.displacement, gap0 + rows @ u, work, size)
         # Unbounded motions are of the order of FAR, and those that a gap stops of the order of 1.
         return np.where(np.abs(stop) > np.sqrt(FAR), stop, 0.0) * (np.abs(stop).max() > 0.99 * FAR)
 
@@ -407,13 +408,13 @@ def needed_friction(
     return high / inscribed, list(motions.combined(sliding[:, None]).by_body())
 
 
-def _extreme(objective: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:
-    """Return y (k,) that maximises ``objective @ y`` for ``gap + gaps @ y >= 0``, ``held @ y = 0`` and ``|y| <= bound``.
+def _maximiser(objective: Array, gaps: Array, gap: Array, E: Array, bound: float) -> Array:
+    """Return y (k,) that maximises ``objective @ y`` for ``gap + gaps @ y >= 0``, ``E @ y = 0`` and ``|y| <= bound``.
 
     Returns zeros if the linear programme has no solution.
     """
     from scipy.optimize import linprog
 
-    equalities = {"A_eq": held, "b_eq": np.zeros(len(held))} if len(held) else {}
+    equalities = {"A_eq": E, "b_eq": np.zeros(len(E))} if len(E) else {}
     optimum = linprog(-objective, A_ub=-gaps, b_ub=gap, bounds=(-bound, bound), method="highs", **equalities)
     return np.zeros(len(objective)) if optimum.x is None else np.asarray(optimum.x)

@@ -13,7 +13,7 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_sides import MaterialSides
-from fastcontact.errors import FastcontactError, ModelError, Suggesting, unknown
+from fastcontact.errors import FastcontactError, ModelError, NameSuggestions, unknown
 from fastcontact.results.units import value_text, with_unit
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -133,7 +133,7 @@ def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactResult(Suggesting):
+class ContactResult(NameSuggestions):
     """State of one contact pair at the end of a load step.
 
     Arrays of length m belong to the m nodes of the secondary side, which are ordered along the surface.
@@ -399,7 +399,7 @@ class ContactsByName(dict[str, ContactResult]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StepResult(Suggesting):
+class StepResult(NameSuggestions):
     """State at the end of one load step.
 
     Attributes
@@ -612,7 +612,7 @@ class StepResult(Suggesting):
 MAX_SHOWN = 30
 
 
-class _Steps(Suggesting):
+class _Steps(NameSuggestions):
     """Base class of lists of steps, whose AttributeError states that an attribute belongs to each step."""
 
     if not TYPE_CHECKING:

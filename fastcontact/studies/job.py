@@ -24,7 +24,7 @@ import numpy as np
 from fastcontact._jit import decorators as _jit
 from fastcontact._version import __version__
 from fastcontact.analysis.run import solve, solve_steps
-from fastcontact.cases.case import Case, build_case, digest, files_named
+from fastcontact.cases.case import Case, build_case, digest, referenced_files
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
@@ -109,7 +109,7 @@ class Job(Run):
         """Hash of all inputs of the run: the case, its mesh, the contents of the files in the case, and the version."""
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
         inputs = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
-        inputs["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
+        inputs["files"] = digest(referenced_files({key: data[key] for key in data if key != "mesh"}, self.folder))
         inputs["mesh"] = None if self.base is None else digest_of_mesh(self.base)
         return hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode()).hexdigest()[:32]
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import Array
+from fastcontact.cases import checks
 from fastcontact.cases.case import Case
-from fastcontact.cases.checks import OF_PAIRS, OF_PROBES, REQUIRED_OPTIONS, defined, kind_of_unit, measured
+from fastcontact.cases.checks import defined_names, kind_of_unit, quantity_value
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.errors import CaseError, unknown
@@ -43,7 +44,7 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     if pair is not None:
         quantities["von_mises_depth"] = _depth(case, pair, position)
     for name in _probe_and_pair_names(case):
-        if np.isfinite(value := measured(name, last, case.probes)):
+        if np.isfinite(value := quantity_value(name, last, case.probes)):
             quantities[name] = value
     return quantities
 
@@ -64,11 +65,12 @@ def _probe_and_pair_names(case: Case) -> list[str]:
     Checks use the same names. Quantities that require an option are omitted for pairs without this option.
     """
     kinematics = case.model.kinematics
-    names = [f"{probe}.{kind}" for probe in case.probes for kind in defined(OF_PROBES, kinematics) if kind != "shear"]
+    probe_kinds = [kind for kind in defined_names(checks.PROBE_QUANTITIES, kinematics) if kind != "shear"]
+    names = [f"{probe}.{kind}" for probe in case.probes for kind in probe_kinds]
     for pair in case.model.contact:
         options = {*pair.options, *(["rotation"] if pair.rotation else [])}
-        for kind in defined(OF_PAIRS, kinematics):
-            if kind not in REQUIRED_OPTIONS or REQUIRED_OPTIONS[kind][0] in options:
+        for kind in defined_names(checks.PAIR_QUANTITIES, kinematics):
+            if kind not in checks.REQUIRED_OPTIONS or checks.REQUIRED_OPTIONS[kind][0] in options:
                 names.append(f"{pair.name}.{kind}")
     return names
 

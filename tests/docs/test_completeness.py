@@ -61,7 +61,7 @@ def test_every_command_is_listed():
 
 def test_every_key_of_case_files_is_listed():
     page = text("reference/case-files.md")
-    for key in {**keys.TOP, **keys.STUDY}:
+    for key in {**keys.TOP_LEVEL, **keys.STUDY}:
         assert re.search(rf"[`\[]{key}[`\].]", page), key
 
 
@@ -74,7 +74,7 @@ def test_every_mesh_maker_is_listed_with_its_keys():
 
 def test_every_quantity_of_checks_is_listed():
     page = text("reference/case-files.md")
-    for name in (*checks.OF_PROBES, *checks.OF_PAIRS):
+    for name in (*checks.PROBE_QUANTITIES, *checks.PAIR_QUANTITIES):
         kind = name.split(".")[0]
         assert re.search(rf"`{kind}(\.\w+)?`", page), name
 
@@ -88,7 +88,7 @@ def test_every_option_of_contact_pairs_is_listed():
 def test_every_formulation_solver_shape_and_theory_is_named():
     for name in FORMULATIONS:
         assert f"`{name}`" in text("howto/formulation.md"), name
-    for name in linear.KNOWN:
+    for name in linear.SOLVER_NAMES:
         assert f'(`"{name}"`)' in text("theory/linear-algebra.md"), name
     for name in fc.obstacles.SHAPES:
         assert f"| `{name}`" in text("howto/rigid-indenter.md"), name

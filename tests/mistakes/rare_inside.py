@@ -19,7 +19,7 @@ import fastcontact as fc
 from fastcontact._tools import hdf5
 from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.cases.case import read_case
-from fastcontact.cases.keys import called
+from fastcontact.cases.keys import call_with_keys
 from fastcontact.cli import _study, bench, cases
 from fastcontact.cli._outputs import check_outputs
 from fastcontact.contact.configuration import Configuration
@@ -38,7 +38,7 @@ from fastcontact.studies import report as render
 from fastcontact.studies import settings as levels
 from fastcontact.studies.settings import Combination, recipe, settings
 
-REPEATED = re.escape(str(pivot_order.RepeatedError()))
+REPEATED = re.escape(str(pivot_order.DependenceError()))
 
 
 def pair_of(size):
@@ -118,7 +118,7 @@ def distorted_facets(patch):
 
 def stuck(patch):
     patch.setattr(solver, "MAX_ITERATIONS", 0)
-    patch.setattr(amg, "AFFORDABLE", {2: 0})
+    patch.setattr(amg, "MAX_FACTORISED_DOFS", {2: 0})
     solved(blocks(), linear_solver="amg")
 
 
@@ -201,10 +201,10 @@ CALLS = [
     ("values of points beyond the mesh", profile_beyond_the_mesh, fc.errors.FileError, r"profile 'P' refers to point 9 of 4: write the file again"),
     ("parts of a file that do not fit", parts_that_do_not_fit, fc.errors.FileError, r"the parts of '.*a\.vtk' are inconsistent: check the file, or convert it to \.med"),
     ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' is not readable: ask its owner for read permission"),
-    ("equations on the same unknown", repeated_equations, pivot_order.RepeatedError, REPEATED),
-    ("equations that are equal", lambda: pivot_order.block_inverse(csr_array(np.ones((2, 2)))), pivot_order.RepeatedError, REPEATED),
-    ("more equations than unknowns", lambda: pivot_order.matched_pivots(csr_array(np.ones((2, 1)))), pivot_order.RepeatedError, REPEATED),
-    ("equations that are nearly equal", lambda: pivot_order.block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), pivot_order.RepeatedError, REPEATED),
+    ("equations on the same unknown", repeated_equations, pivot_order.DependenceError, REPEATED),
+    ("equations that are equal", lambda: pivot_order.block_inverse(csr_array(np.ones((2, 2)))), pivot_order.DependenceError, REPEATED),
+    ("more equations than unknowns", lambda: pivot_order.matched_pivots(csr_array(np.ones((2, 1)))), pivot_order.DependenceError, REPEATED),
+    ("equations that are nearly equal", lambda: pivot_order.block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), pivot_order.DependenceError, REPEATED),
     ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): round-off prevents a smaller one if moduli or displacements differ by many orders of magnitude\. Replace a stiff body by a rigid obstacle"),
     ("springs that stay stretched", not_slack, fc.ConvergenceError, r"contact does not hold .*: after \d+ trial positions, a force of .* is still missing for equilibrium under a load of 10\. Add a support \(step 1 from 0 to 1; more load steps may help\)$"),
     ("benchmarks without checkout", no_checkout, fc.errors.FastcontactError, r"the benchmarks need the source checkout, and there is no '.*': install it with pip install -e"),
@@ -224,8 +224,8 @@ CALLS = [
     ("a sweep without a point", no_point, fc.MeshError, r"no point of the sweep could be solved; .*: the mesh is folded"),
     ("packed data larger than unpacked", packed_beyond_its_size, fc.errors.FileError, r"is larger compressed than uncompressed: the file is damaged; write it again"),
     ("a file name beyond all limits", name_too_long, fc.errors.FileError, r"cannot be written \(File name too long\): name another file"),
-    ("a table that a function cannot take", lambda: called("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are invalid \(cannot unpack"),
-    ("a table with a text for numbers", lambda: called("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are invalid \(could not convert"),
+    ("a table that a function cannot take", lambda: call_with_keys("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are invalid \(cannot unpack"),
+    ("a table with a text for numbers", lambda: call_with_keys("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are invalid \(could not convert"),
     ("a size that is no number", lambda: fc.generate.quarter_disc(size="x"), fc.MeshError, r"^the argument size of quarter_disc must be a number or None, not the string 'x'$"),
     ("one size for two", lambda: fc.generate.block(1.0), fc.MeshError, r"^the argument size of block must be two numbers, not the float 1\.0$"),
     ("arrays of meshio that do not fit together", arrays_apart, fc.MeshError, r"the arrays of meshio's mesh do not fit together: list index out of range"),

@@ -12,7 +12,7 @@ import pytest
 from new_process import printed
 
 import fastcontact as fc
-from fastcontact.errors import Suggesting
+from fastcontact.errors import NameSuggestions
 from fastcontact.results.step import Steps
 
 FOLDER = Path(fc.__file__).parent
@@ -119,7 +119,7 @@ def test_objects_are_copied_and_pickled_with_their_suggestions():
         assert not hasattr(again, "_nothing")
 
 
-class Broken(Suggesting):
+class Broken(NameSuggestions):
     @property
     def total(self):
         return self._parts.sum

@@ -240,7 +240,7 @@ def here(name: str) -> list[dict]:
         if step.load_factor != round(step.load_factor):
             continue
         element, along = ELEMENTS[kind], slice(1, 2) if kind == "CAX8" else slice(None)
-        history = step.restart["history"] if step.restart and step.restart.get("history") else bodies.beginning
+        history = step.restart["history"] if step.restart and step.restart.get("history") else bodies.initial_history
         stress = bodies.at(step.displacement, history, tangent=False).stress[element]
         order = gauss_order(kind)[::4] if has_points(kind) else []
         found.append(

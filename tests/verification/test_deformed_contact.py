@@ -501,7 +501,7 @@ def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, er
 
     h = 1e-5
     (force1, gaps1), (force0, gaps0) = values(u + h * du.ravel()), values(u - h * du.ravel())
-    force, gaps = here.geometry(multiplier, tangential, u.reshape(points.shape)).along(du)
+    force, gaps = here.geometry(multiplier, tangential, u.reshape(points.shape)).derivatives_along(du)
     difference = (force1 - force0) / (2 * h)
     assert np.abs(difference).max() > 0.0
     assert np.abs(force.ravel() - difference).max() <= error * np.abs(difference).max()

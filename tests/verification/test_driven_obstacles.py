@@ -11,7 +11,7 @@ from refusals import refused
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.cases.summary import lines, of_step, summarise
+from fastcontact.cases.summary import lines, step_entry, summarise
 from fastcontact.cli import main
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide, Rotation
@@ -176,7 +176,7 @@ def test_from_case_file_to_result_file(tmp_path):
     moved.add_obstacle("plane", secondary="CONT1", obstacle=plane, motion=down)
     there = fc.solve(moved, 1)[-1].contact["plane"]
     assert there.force[1] == pytest.approx(-2.0e5, rel=1e-8)
-    summary = json.loads(json.dumps(summarise(case, steps[-1], [of_step(step) for step in steps], {}, [])))
+    summary = json.loads(json.dumps(summarise(case, steps[-1], [step_entry(step) for step in steps], {}, [])))
     assert summary["contact"]["plane"]["obstacle_displacement"] == contact.obstacle_displacement.tolist()
     assert any("obstacle 'plane' is displaced by (0, -" in line for line in lines(summary))
     with fc.open_results(tmp_path / "r.vtkhdf") as results:

@@ -149,7 +149,7 @@ def test_a_plastic_body_in_simple_shear(kinematics: str, element: str, count: in
     bodies = NonlinearBodies(mesh, kinematics, "finite", model.material_field())
     along, across = (1, 0) if kinematics == "axisymmetric" else (0, 1)
     moved, step = np.zeros_like(mesh.points), 1.0 / count
-    history = bodies.beginning
+    history = bodies.initial_history
     for number in range(1, count + 1):
         moved[:, along] = number * step * mesh.points[:, across]
         here = bodies.at(moved, history, tangent=False)
@@ -172,7 +172,7 @@ def test_plastic_history_turns_with_the_body() -> None:
     first, second = (np.eye(3) + 0.2 * rng.normal(size=(3, 3)) for _ in range(2))
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
-    yielded = bodies.at(mesh.points @ (first - np.eye(3)).T, bodies.beginning).history
+    yielded = bodies.at(mesh.points @ (first - np.eye(3)).T, bodies.initial_history).history
     further = second @ first
     one, other = (bodies.at(mesh.points @ (F - np.eye(3)).T, yielded) for F in (further, turn @ further))
     assert one.history["hex20"][..., 6].min() > yielded["hex20"][..., 6].max() > 0.1
@@ -347,7 +347,7 @@ def test_pressure_follows_the_wall_of_a_tube(element: str, count: int) -> None:
     ("kinematics", "element"), [("plane_strain", "quad8"), ("axisymmetric", "tri6"), ("3d", "hex8"), ("3d", "tet10")]
 )
 def test_following_pressure_is_the_derivative_of_a_volume(kinematics: str, element: str) -> None:
-    from fastcontact.elasticity.following_pressure import FollowingPressure
+    from fastcontact.elasticity.following_pressure import FollowerPressure
     from fastcontact.elasticity.loads import Pressure
 
     if kinematics == "3d":
@@ -362,7 +362,7 @@ def test_following_pressure_is_the_derivative_of_a_volume(kinematics: str, eleme
         )
     rng = np.random.default_rng(0)
     u, along = 0.1 * rng.normal(size=(2, *mesh.points.shape))
-    pressures = [FollowingPressure(mesh, kinematics, Pressure(name, 2.0)) for name in names]
+    pressures = [FollowerPressure(mesh, kinematics, Pressure(name, 2.0)) for name in names]
 
     def forces(displacement: np.ndarray) -> np.ndarray:
         return sum(pressure.at(displacement)[0] for pressure in pressures)

@@ -74,7 +74,7 @@ def displaced(mesh: fc.Mesh, F: np.ndarray) -> np.ndarray:
 
 def check(mesh: fc.Mesh, kinematics: str, bodies: NonlinearBodies, F: np.ndarray, stress: np.ndarray) -> None:
     """Assert that every point has `stress` (3, 3), and that no node inside has a force."""
-    here, scale = bodies.at(displaced(mesh, F), bodies.beginning), np.abs(stress).max()
+    here, scale = bodies.at(displaced(mesh, F), bodies.initial_history), np.abs(stress).max()
     pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
     for found in here.stress.values():
         exact = [stress[pair] for pair in pairs[: found.shape[-1]]]
@@ -154,7 +154,7 @@ def test_a_rotation_by_90_degrees_leaves_no_stress(kinematics: str, element: str
     bodies = NonlinearBodies(mesh, kinematics, "finite", model.material_field())
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     turn = turn @ turn.T[[1, 2, 0]][:, [1, 2, 0]] if kinematics == "3d" else turn
-    here, E = bodies.at(displaced(mesh, turn), bodies.beginning), 200.0 if law == "plastic" else 2.8
+    here, E = bodies.at(displaced(mesh, turn), bodies.initial_history), 200.0 if law == "plastic" else 2.8
     assert max(np.abs(stress).max() for stress in here.stress.values()) <= 1e-10 * E
     assert np.abs(here.force).max() <= 1e-10 * E
 

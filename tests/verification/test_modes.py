@@ -14,7 +14,7 @@ from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
 from fastcontact.cli import main
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.contact.linearised_geometry import faced
+from fastcontact.contact.linearised_geometry import paired_points
 from fastcontact.contact.pairing import Candidates
 from fastcontact.mesh import elements
 
@@ -377,7 +377,7 @@ def test_contact_stiffness_in_space_is_minus_the_second_difference_of_gaps(eleme
 
     def faced_at(u):
         pairing = pair.facing(candidates, replace(config, displacement=u))
-        return faced(candidates, pairing, rows, pair.primary, mesh.points + u, "facet", config.pose)
+        return paired_points(candidates, pairing, rows, pair.primary, mesh.points + u, "facet", config.pose)
 
     points = [faced_at(factor * du) for factor in (-1.0, 0.0, 1.0)]
     before, at_rest, after = (force @ np.einsum("nd,nd->n", p.apart, p.normal) for p in points)

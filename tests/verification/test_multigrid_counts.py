@@ -41,7 +41,7 @@ def counted(analysis, work):
 
 def linear_iterations(analysis):
     lift = analysis.load_at(1.0).lift
-    loaded = analysis.solver.load(analysis.system.right(np.zeros_like(lift), lift))
+    loaded = analysis.solver.load(analysis.system.right_side(np.zeros_like(lift), lift))
     return counted(analysis, lambda: loaded.solve(csr_array((0, len(lift))), np.empty(0)))
 
 
@@ -53,7 +53,7 @@ def test_linear_and_tied_solutions_take_the_same_few_iterations_at_any_size(n):
     rows = analysis.pairs["c"].constraints(Configuration.undeformed(analysis.model.mesh.points))
     B, gap0 = analysis.system.rows(rows.B, rows.gap0, lift)
     all_rows = np.flatnonzero(np.diff(B.indptr) > 0)
-    loaded = analysis.solver.load(analysis.system.right(np.zeros_like(lift), lift))
+    loaded = analysis.solver.load(analysis.system.right_side(np.zeros_like(lift), lift))
     for tied in (all_rows, all_rows[::2]):
         assert counted(analysis, lambda tied=tied: loaded.solve(B[tied], -gap0[tied])) <= 14
     assert analysis.solver.counters.setups == 1

@@ -193,14 +193,14 @@ def newton(
 SLIP_COMPLIANCE = LENGTH_ROUND_OFF
 
 
-def compliance_of_each(F: Array, parts: int) -> Array:
-    """Return the compliance (parts, parts, m) of each constraint, given the compliance F (parts m, parts m) of all.
+def compliance_of_each(F: Array, number: Indices) -> Array:
+    """Return the compliance (1 + k, 1 + k, m) of each constraint, given the compliance F (n, n) of all.
 
-    `parts` is 1 + k; F has the normal components of all constraints first, then the components along each tangent.
+    `number` (1 + k, m) are the numbers in F of the normal components, then of the components along each tangent. Components
+    with negative numbers have no compliance.
     """
-    m = len(F) // parts
-    index = np.arange(parts * m).reshape(parts, m)
-    return np.asarray(F[index[:, None], index[None]])
+    given = number >= 0
+    return np.where(given[:, None] & given, F[number[:, None], number], 0.0)
 
 
 def compliance_of_rows(rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:

@@ -40,13 +40,14 @@ REGULARISATION = ROUND_OFF, LENGTH_ROUND_OFF
 
 
 def solve(
-    F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None, equality: Mask | None = None
-) -> Forces:
+    F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None, equality: Mask | None = None,
+    components: Indices | None = None,
+) -> Forces:  # fmt: skip
     """Return the forces that satisfy unilateral contact and Coulomb's law.
 
     Parameters
     ----------
-    F : ndarray ((1 + k) m, (1 + k) m)
+    F : ndarray (n, n)
         Delassus operator of m constraints, symmetric and positive semidefinite [length / force]. Its rows and columns belong
         to the normal components of all constraints, then to their components along each of k tangents.
     free : ndarray (1 + k, m)
@@ -60,34 +61,39 @@ def solve(
         Another initial guess of the forces, which is tried first [force].
     equality : ndarray of bool (m,), optional
         Constraints that are equations, without friction.
+    components : ndarray of int (n,), optional
+        Positions, in arrays (1 + k, m), of the components that belong to F, by default all; they include all normal ones. The
+        forces along the other components are zero.
 
     Returns
     -------
     Forces
         Contact forces, gaps and slips, and whether the solution has converged.
     """
-    n_components, m = free.shape
+    m = free.shape[1]
     equality = np.zeros(m, bool) if equality is None else equality
     law = Law(np.where(equality, 0.0, mu), equality)
     if not m:
         return Forces(free * 0.0, free, closed, closed, True, 0.0, 0)
     unit = _units(F, m)
     length = float(np.abs(free * unit).max()) or 1.0
-    units = np.tile(unit, n_components)
+    components = np.arange(free.size) if components is None else components
+    units = unit[components % m]
     F, best, iterations, elastic_slip = units[:, None] * F * units, None, 0, 0.0
     if guess is not None:
         guess = guess / (length * unit)
     for compliance in REGULARISATION if _dependent(F) else (0.0,):
         regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
         F[regularised, regularised] += compliance
-        problem = _Problem(F, free * unit / length, law)
+        problem = _Problem(F, free * unit / length, law, components)
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
             # which is common to all constraints, although gaps of constraints with a large compliance are not closed.
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, min_iterations=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
-                best, elastic_slip = forces, compliance * float(np.abs(forces.y.ravel()[regularised]).max(initial=0.0))
+                largest = float(np.abs(forces.y.ravel()[components[regularised]]).max(initial=0.0))
+                best, elastic_slip = forces, compliance * largest
             if forces.settled:
                 break
         if best is not None and best.settled and elastic_slip <= SINGLE_PRECISION:
@@ -114,21 +120,20 @@ class _Problem:
     F is scaled such that the compliance of each gap is one.
     """
 
-    def __init__(self, F: Array, free: Array, law: Law) -> None:
-        self.F, self.free, self.law = F, free, law
+    def __init__(self, F: Array, free: Array, law: Law, components: Indices) -> None:
+        self.F, self.free, self.law, self.components = F, free, law, components
         self.round_off = SUM_ROUND_OFF * float(np.abs(free).max())
 
     def gaps(self, y: Array) -> Array:
         """Return gaps and slips (1 + k, m) for forces y (1 + k, m)."""
-        return self.free + (self.F @ y.ravel()).reshape(self.free.shape)
+        return self.free + spread(self.F @ y.ravel()[self.components], self.components, self.free.shape)
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised`."""
-        forces, rows = np.zeros_like(y), np.flatnonzero(closed)
-        if len(rows):
-            A, D = _equations(self.law, self.F, y, gaps, rows, sticking)
-            right_side = -np.einsum("abq,bq->aq", D, self.free[:, rows])
-            forces[:, rows] = _dense_solution(A, right_side.ravel()).reshape(right_side.shape)
+        if not closed.any():
+            return np.zeros_like(y), self.free
+        A, D, at = _equations(self.law, self.F, y, gaps, closed, sticking, self.components)
+        forces = spread(_dense_solution(A, -(D @ self.free.ravel()[at])), at, y.shape)
         return forces, self.gaps(forces)
 
     def starts(self, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
@@ -162,7 +167,7 @@ class _Problem:
         """
         compliance, last, halvings = NOTABLE, 1.0, 0
         while compliance > ROUND_OFF and halvings <= HALVINGS:
-            softened = _Problem(self.F + compliance * np.eye(len(self.F)), self.free, self.law)
+            softened = _Problem(self.F + compliance * np.eye(len(self.F)), self.free, self.law, self.components)
             forces = newton(softened, y, softened.gaps(y), min_iterations=1)
             if forces.settled:
                 y, last, compliance, halvings = forces.y, compliance, NOTABLE * compliance, 0
@@ -171,41 +176,65 @@ class _Problem:
         return y
 
 
-def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
-    """Return A and D of the equations ``A y + D free = 0`` of the closed constraints `rows` (q,).
+def spread(values: Array, at: Indices, shape: tuple[int, ...]) -> Array:
+    """Return an array of a `shape` with the `values` (n,) at the positions `at` (n,), and zeros elsewhere."""
+    result = np.zeros(shape)
+    result.ravel()[at] = values
+    return result
 
-    A ((1 + k) q, (1 + k) q) is ``E + D F`` with E and D (1 + k, 1 + k, q) of `Law.linearised`.
+
+def numbered(at: Indices, shape: tuple[int, ...]) -> Indices:
+    """Return an array of a `shape` with the numbers 0 to n - 1 at the positions `at` (n,), and -1 elsewhere."""
+    result = np.full(shape, -1, np.intp)
+    result.ravel()[at] = np.arange(len(at))
+    return result
+
+
+def _equations(
+    law: Law, F: Array, y: Array, gaps: Array, closed: Mask, sticking: Mask, components: Indices
+) -> tuple[Array, csr_array, Indices]:
+    """Return A, D and the positions (n,) of the forces x in y of the equations ``A x + D free = 0`` of `closed` constraints.
+
+    A (n, n) is ``E + D F`` with E and D of `Law.linearised`. F belongs to the `components`, see `solve`.
     """
-    components, positions = np.arange(len(y)), np.arange(len(rows))
-    E, D = law.linearised(y, gaps, rows, sticking)
-    unknown = (components[:, None] * y.shape[1] + rows).ravel()
-    A = np.einsum("abq,bqn->aqn", D, F[np.ix_(unknown, unknown)].reshape(len(y), len(rows), -1))
-    for b in components:
-        A[:, positions, b * len(rows) + positions] += E[:, b]
-    return A.reshape(unknown.size, -1), D
+    rows, selected = np.flatnonzero(closed), np.flatnonzero(closed[components % len(closed)])
+    number = numbered(components[selected], y.shape)[:, rows]
+    shape = len(number), *number.shape
+    row, column = np.broadcast_to(number[:, None], shape), np.broadcast_to(number, shape)
+
+    def matrix(blocks: Array) -> csr_array:
+        nonzero = (blocks != 0.0) & (row >= 0) & (column >= 0)
+        return csr_array((blocks[nonzero], (row[nonzero], column[nonzero])), shape=2 * (len(selected),))
+
+    E, D = map(matrix, law.linearised(y, gaps, rows, sticking))
+    A = np.asarray(D @ F[np.ix_(selected, selected)])
+    A += E
+    return A, D, components[selected]
 
 
-def response(F: Array, law: Law, forces: Forces, held_slips: Mask, Q: csr_array | None) -> Callable[[Array], Array]:
+def response(
+    F: Array, law: Law, forces: Forces, held_slips: Mask, Q: csr_array | None, components: Indices
+) -> Callable[[Array], Array]:
     """Return a function that computes the derivative of the solution `forces`.
 
-    The function returns the change ((1 + k) m,) of the forces due to a change ((1 + k) m,) of the gaps and slips without
-    forces. F and the constraints of `law` are those of `solve`. Q is the rotation of their tangents, if these are rotated.
-    Along the held tangents, `held_slips` (k, m), slips do not vary.
+    The function returns the change (n,) of the forces due to a change (n,) of the gaps and slips without forces, both along
+    the `components`. F, the constraints of `law` and the components are those of `solve`. Q is the rotation of the tangents,
+    if these are rotated. Along the held tangents, `held_slips` (k, m), slips do not vary.
     """
-    rows = np.flatnonzero(forces.closed)
-    if not len(rows):
+    if not forces.closed.any():
         return np.zeros_like
-    unit = _units(F, len(law.mu))
-    units = np.tile(unit, len(forces.y))
-    A, D = _equations(law, units[:, None] * F * units, forces.y / unit, forces.gaps * unit, rows, forces.sticking)
+    m = len(law.mu)
+    unit = _units(F, m)
+    units = unit[components % m]
+    A, D, at = _equations(
+        law, units[:, None] * F * units, forces.y / unit, forces.gaps * unit, forces.closed, forces.sticking, components
+    )
     solve_dense = lu_solver(A)
 
     def force_change(gaps: Array) -> Array:
-        values = (gaps if Q is None else Q @ gaps).reshape(forces.y.shape) * unit
+        values = spread(gaps if Q is None else Q @ gaps, components, forces.y.shape) * unit
         values[1:][held_slips] = 0.0
-        change, right_side = np.zeros_like(values), -np.einsum("abq,bq->aq", D, values[:, rows])
-        change[:, rows] = solve_dense(right_side.ravel()).reshape(right_side.shape)
-        change = (change * unit).ravel()
+        change = (spread(solve_dense(-(D @ values.ravel()[at])), at, values.shape) * unit).ravel()[components]
         return change if Q is None else np.asarray(Q.T @ change)
 
     return force_change
@@ -248,7 +277,7 @@ def _polyhedral_forces(problem: _Problem, edges: int) -> Array | None:
     X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), edge_directions.T]]), np.eye(m))
     X = np.hstack([X, -np.eye(len(X))[:, equations]])
     M = np.zeros((size, size))
-    M[:last, :last] = X.T @ problem.F @ X
+    M[:last, :last] = X[problem.components].T @ problem.F @ X[problem.components]
     M[last:, :m] = np.diag(problem.law.mu)
     M[last:, m:along_edges] = -np.tile(np.eye(m), edges)
     M[m:along_edges, last:] = np.tile(np.eye(m), edges).T

@@ -26,12 +26,13 @@ from fastcontact.analysis.friction.cone_newton import (
     held_tangents,
     rotated,
 )
+from fastcontact.analysis.friction.dense import numbered, spread
 from fastcontact.analysis.solution import Accuracy, Forces, Path, SlipSoFar, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
+from fastcontact.linear.delassus import MAX_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
@@ -141,28 +142,34 @@ def _with_included(
     """
     rows = np.flatnonzero(included)
     k, m = len(constraints.tangents), len(constraints)
-    check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
+    # In arrays (1 + k, q), F has no rows for the slips of constraints whose pair has no friction.
+    frictional = np.stack(constraints.directions)[:, rows].any(axis=(0, 2))
+    components = np.flatnonzero(np.vstack([np.ones_like(frictional), *k * [frictional]]))
+    check_rows(len(components), MAX_ROWS_WITH_FRICTION)
     all_rows = csr_array(vstack([constraints.B, *constraints.tangents], format="csr"))
-    R = all_rows[(np.arange(1 + k)[:, None] * m + rows).ravel()]
+    place = (np.arange(1 + k)[:, None] * m + rows).ravel()[components]
+    R = all_rows[place]
     gaps_at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
+    number = numbered(components, (1 + k, len(rows)))
     slips = np.arange(len(rows), len(F))
     # This compliance is added before held tangents are detected, since compliant tangents are not held.
-    F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
-    Q = aligning_rotation(compliance_of_each(F, 3)) if k == 2 else None
-    C = compliance_of_each(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
+    F[slips, slips] += np.tile(constraints.tangential_softness[rows[frictional]], k)
+    Q = aligning_rotation(compliance_of_each(F, number)) if k == 2 else None
+    Q_F = None if Q is None else Q[components][:, components]
+    C = compliance_of_each(F if Q_F is None else np.asarray(Q_F @ (Q_F @ F).T), number)
     C[0, 0] += np.where(constraints.prescribed, constraints.softness, 0.0)[rows]
-    held_slips = held_tangents(C)
-    held_rows = np.flatnonzero(held_slips) + len(rows)
-    _add_compliance(F, constraints, rows)
+    held_slips = held_tangents(C) & frictional
+    held_rows = number[1:][held_slips]
+    _add_compliance(F, constraints, rows, components)
     F += loaded.rigid_compliance(R)
-    free = free.reshape(1 + k, -1) + gaps_at_rest[:, rows]
+    free = spread(free, components, number.shape) + gaps_at_rest[:, rows]
     guess = None if forces is None else forces[:, rows]
     y0, closing = np.zeros_like(free), np.zeros_like(free)
     if path is not None:
         y0, closing = path.along(constraints.directions, rows)
-    if Q is not None:
-        F = np.asarray(Q @ (Q @ F).T)
+    if Q is not None and Q_F is not None:
+        F = np.asarray(Q_F @ (Q_F @ F).T)
         free, y0, closing = (rotated(Q, values) for values in (free, y0, closing))
         guess = None if guess is None else rotated(Q, guess)
     if len(held_rows):
@@ -173,27 +180,28 @@ def _with_included(
         y0[1:][held_slips], closing[1:][held_slips] = 0.0, 0.0
     mu, equations = constraints.friction[rows], constraints.equality[rows]
     if path is None:
-        result, before = dense.solve(F, free, mu, closed[rows], guess, equations), None
+        result, before = dense.solve(F, free, mu, closed[rows], guess, equations, components), None
         gaps_of_included = result.gaps
     else:
-        lag = -free - (F @ y0.ravel()).reshape(free.shape)
+        lag = -free - spread(F @ y0.ravel()[components], components, free.shape)
         lag[0] += closing[0]
 
         def increment(offset: Array, carrying: Mask, closed: Mask, start: Array | None) -> Forces:
             gaps, at = free + offset, np.flatnonzero(carrying)
-            unknown = (np.arange(1 + k)[:, None] * len(rows) + at).ravel()
+            given = np.flatnonzero(number[:, at] >= 0)
+            n = number[:, at].ravel()[given]
             start = None if start is None else start[:, at]
-            result = dense.solve(F[np.ix_(unknown, unknown)], gaps[:, at], mu[at], closed[at], start, equations[at])
+            result = dense.solve(F[np.ix_(n, n)], gaps[:, at], mu[at], closed[at], start, equations[at], given)
             y, (closed, sticking) = np.zeros_like(gaps), np.zeros((2, len(rows)), bool)
             y[:, at], closed[at], sticking[at] = result.y, result.closed, result.sticking
-            gaps += (F[:, unknown] @ result.y.ravel()).reshape(gaps.shape)
+            gaps += spread(F[:, n] @ result.y.ravel()[given], components, gaps.shape)
             return replace(result, y=y, gaps=gaps, closed=closed, sticking=sticking)
 
         result, gaps_of_included, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
     y = result.y
     if Q is not None:
         y, gaps_of_included = rotated(Q.T, y), rotated(Q.T, gaps_of_included)
-    u = loaded.involved_solution(R.T @ y.ravel(), u)
+    u = loaded.involved_solution(R.T @ y.ravel()[components], u)
     all_forces = np.zeros((1 + k, m))
     gaps = gaps_at_rest + (all_rows @ u).reshape(1 + k, m)
     all_forces[:, rows], gaps[:, rows] = y, gaps_of_included
@@ -207,7 +215,9 @@ def _with_included(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
         sticking, result.residual, constraints.directions,
         slip_so_far=None if before is None else _slip_so_far(before, Q, rows, constraints),
-        response=lambda: response(loaded, R, rows, dense.response(F, Law(mu, equations), at_end, held_slips, Q)),
+        response=lambda: response(
+            loaded, R, place, dense.response(F, Law(mu, equations), at_end, held_slips, Q_F, components)
+        ),
     )  # fmt: skip
 
 
@@ -243,8 +253,11 @@ def _slip_so_far(
     return SlipSoFar(slip, slip_before_closing, traction, all_integrals, all_normal, begin)
 
 
-def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
-    """Add, in place, the compliance of the constraints `rows` (q,) to their Delassus operator F ((1 + k) q, (1 + k) q)."""
+def _add_compliance(F: Array, constraints: Constraints, rows: Indices, components: Indices) -> None:
+    """Add, in place, the compliance of the constraints `rows` (q,) to their Delassus operator F (n, n).
+
+    `components` (n,) are the positions, in arrays (1 + k, q), of the components that belong to F.
+    """
     if constraints.compliance is not None and len(rows):
         # C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
         # directions, which vary from one constraint to the next.
@@ -252,9 +265,10 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
         along = np.stack(constraints.coupled_directions or constraints.directions)[:, rows]
         normal = normals(list(along))
         normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
-        frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])
-        F += np.tile(C, 2 * (1 + len(along),)) * (frame @ frame.T)
+        frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])[components]
+        at = components % len(rows)
+        F += C[np.ix_(at, at)] * (frame @ frame.T)
     if constraints.low_rank_compliance.size and len(rows):
-        Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
+        Z = constraints.low_rank_compliance[:, rows].reshape(-1, constraints.low_rank_compliance.shape[2])[components]
         F += Z @ Z.T
     F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]

@@ -13,7 +13,7 @@ from fastcontact.analysis.modal.held_contact import configuration_of
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.integration import areas_of_rule, fine_rule
-from fastcontact.contact.linearised_geometry import faced
+from fastcontact.contact.linearised_geometry import paired_points
 from fastcontact.contact.pairing import Candidates
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
@@ -44,4 +44,5 @@ def _of_pair(pair: Formulation, step: StepResult, name: str, finite: bool) -> cs
     pairing = pair.facing(candidates, configuration)
     rows = np.flatnonzero(pairing.paired & (force != 0.0))
     normals = "facet" if pair.normals == "secondary" else pair.normals
-    return faced(candidates, pairing, rows, pair.primary, deformed, normals, configuration.pose).stiffness(force[rows])
+    points = paired_points(candidates, pairing, rows, pair.primary, deformed, normals, configuration.pose)
+    return points.stiffness(force[rows])

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, lobp
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity.constrained_system import System, separate_supports
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.linear.elimination.coupled_pivots import RepeatedError
+from fastcontact.linear.elimination.coupled_pivots import DependenceError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.multigrid.hierarchy import COARSEST_SIZE
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid
@@ -183,7 +183,7 @@ def _pivots_and_weights(rows: csr_array, nodes: Indices, size: int) -> tuple[Ind
     """
     try:
         elimination = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)
-    except RepeatedError:
+    except DependenceError:
         return _by_qr(rows)
     return elimination.pivots, elimination.full_weights()
 

@@ -116,7 +116,7 @@ def configuration_of(step: StepResult | None, name: str, pair: Formulation) -> C
     contact, configuration = step.contact[name], end_of(step, step, name)
     if contact.wear is None:
         return configuration
-    return replace(configuration, worn=at_points(contact.points, contact.wear, len(pair.points)))
+    return replace(configuration, wear_depth=at_points(contact.points, contact.wear, len(pair.points)))
 
 
 def _conditions(

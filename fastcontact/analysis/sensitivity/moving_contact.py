@@ -26,7 +26,7 @@ from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import entry_rows
-from fastcontact.round_off import DIFFERENCES
+from fastcontact.round_off import DIFFERENCE_STEP
 
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
 OPPOSITE_NODES = (
@@ -121,7 +121,7 @@ class MovingContact:
         points = self.problem.model.mesh.points
         facets = [nodes for side in self._surfaces() for nodes in side.node_positions(points)]
         sizes = [float(np.linalg.norm(np.ptp(nodes, axis=1), axis=1).min()) for nodes in facets]
-        return DIFFERENCES * min(sizes, default=np.inf)
+        return DIFFERENCE_STEP * min(sizes, default=np.inf)
 
     def _surfaces(self) -> list[Surface]:
         pairs = self.problem.pairs.values()
@@ -155,7 +155,7 @@ class MovingContact:
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
         """Return half the difference of the two `derivatives` where points project onto an edge between two facets."""
         jump, n = csr_array(0.5 * (forward - backward)), len(self.u)
-        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.increment
+        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCE_STEP / self.increment
         row = entry_rows(jump)
         # Half the difference of one-sided derivatives is larger at a kink. Pressures follow from forces: they are smooth
         # where forces are.
@@ -188,7 +188,7 @@ class MovingContact:
         for side in self._surfaces():
             m = len(side.points)
             local = csr_array((np.ones(m), (side.points, np.arange(m))), (n, m))
-            neighbours = neighbours + local @ side.near @ local.T
+            neighbours = neighbours + local @ side.extended_adjacency @ local.T
         moving = np.ones(len(self.constraints))
         for name, pair in self.problem.pairs.items():
             if pair.options.kind == "tied":  # paired once, before any load

@@ -19,7 +19,7 @@ from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.temperature import Temperature
-from fastcontact.elasticity.varying_constants import varying
+from fastcontact.elasticity.varying_constants import varying_items
 from fastcontact.errors import ModelError, check_known, unknown
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
@@ -43,7 +43,7 @@ def _constant_derivatives(contact: MovingContact, parameter: Label) -> Change:
             (_with_constant(m, name, component, increment) if i == number else m, groups)
             for i, (m, groups) in enumerate(model.materials)
         ]
-        pairs = {pair.name: changed_model.bind(pair, problem.pairs[pair.name].held) for pair in changed_model.contact}
+        pairs = {p.name: changed_model.bind(p, problem.pairs[p.name].held_motions) for p in changed_model.contact}
         return replace(contact, problem=replace(problem, model=changed_model, pairs=pairs))
 
     # Central differences with an error of fourth order in the step.
@@ -69,7 +69,7 @@ def _constant_of(model: Model, parameter: Label) -> tuple[int, Material, int | N
     (number, material), name = matches[0], str(parameter[0])
     value = getattr(material, name, None)
     components = value if isinstance(value, tuple) else (value,)
-    if value is None or any(map(varying, components)):
+    if value is None or any(map(varying_items, components)):
         raise ModelError(f"the material {parameter[1]!r} has no constant {name}: its sensitivity is not available")
     return number, material, _component(parameter, list(CONSTANTS[name]) if len(components) > 1 else [])
 
@@ -169,11 +169,11 @@ def _items_on_group(kind: str, items: Sequence[Item], parameter: Label, others: 
     """
     group = str(parameter[1])
     items_of_group = [
-        item if len(item.places) == 1 else replace(item, groups=(group,))  # type: ignore[type-var]
-        for item in items if group in item.places
+        item if len(item.group_names) == 1 else replace(item, groups=(group,))  # type: ignore[type-var]
+        for item in items if group in item.group_names
     ]  # fmt: skip
     if not items_of_group and parameter[1] not in others:
-        names = [place for item in items for place in item.places]
+        names = [name for item in items for name in item.group_names]
         raise ModelError(unknown(kind, str(parameter[1]), list(dict.fromkeys([*names, *others]))))
     return items_of_group
 

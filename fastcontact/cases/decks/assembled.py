@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -11,15 +12,14 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.cases.decks.blocks import Location, Row, key_of, look_up
+from fastcontact.cases.decks.blocks import LONGEST_QUOTED, Location, Row, key_of, look_up
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, Surface, SurfaceEntry
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.mesh import elements
 
-# Number of set names that a message lists, and length to which it cuts a name.
-SHOWN = 12
-LONGEST = 80
+# Largest number of set names that a message lists.
+MOST_NAMES = 12
 
 
 @dataclass(eq=False, slots=True)
@@ -109,7 +109,7 @@ class Assembly:
         return ["", *self.content.instances]
 
     def split_name(self, name: str) -> tuple[str, str]:
-        """Split a name into its instance, which may be empty, and the rest: ``Part-1.17`` is node 17 of Part-1."""
+        """Split a name into its instance, which may be empty, and the name in it: ``Part-1.17`` is node 17 of Part-1."""
         text = key_of(name)
         for scope in self.content.instances:
             if text.startswith(scope + "."):
@@ -118,30 +118,30 @@ class Assembly:
 
     def members(self, kind: str, name: str, location: Location) -> list[Any]:
         """Return the points or the elements, by `kind`, of a set or a number. Raises CaseError if it is not defined."""
-        scope, rest = self.split_name(name)
-        if rest.isdecimal():
-            return [self._item(kind, scope, int(rest[:19]), location)]
-        return self.members_of(kind, scope, rest, location, name)
+        scope, label = self.split_name(name)
+        if label.isdecimal():
+            return [self._item(kind, scope, int(label[:19]), location)]
+        return self.members_of(kind, scope, label, location, name)
 
-    def members_of(self, kind: str, scope: str, name: str, location: Location, shown: str = "") -> list[Any]:
+    def members_of(self, kind: str, scope: str, name: str, location: Location, full_name: str = "") -> list[Any]:
         """Return the points or elements of a set of an instance, including those of nested sets.
 
-        Raises CaseError, with the name `shown`, if the set is not defined.
+        Raises CaseError if the set is not defined; the message contains `full_name`, by default `name`.
         """
-        part, label = self.part(scope), (kind, scope, name)
+        part, key = self.part(scope), (kind, scope, name)
         sets = part.node_sets if kind == "node" else part.element_sets
         if name not in sets:
-            names = sorted({part.set_names[key] for key in sets})
-            listed = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "") or "none"
-            raise location.refuse(f"set '{(shown or name)[:LONGEST]}' is not defined; {kind} sets: {listed}")
-        if label not in self.resolved:
-            if label in self.being_resolved:
-                raise location.refuse(f"set '{part.set_names[name]}' contains itself")
-            self.being_resolved.append(label)
+            names = sorted({part.set_names[other] for other in sets})
+            listed = ", ".join(names[:MOST_NAMES]) + (", ..." if len(names) > MOST_NAMES else "") or "none"
+            raise location.error(f"set '{(full_name or name)[:LONGEST_QUOTED]}' is not defined; {kind} sets: {listed}")
+        if key not in self.resolved:
+            if key in self.being_resolved:
+                raise location.error(f"set '{part.set_names[name]}' contains itself")
+            self.being_resolved.append(key)
             members = [member for entry in sets[name] for member in self._members_of_entry(kind, scope, entry)]
             self.being_resolved.pop()
-            self.resolved[label] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
-        return self.resolved[label]
+            self.resolved[key] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
+        return self.resolved[key]
 
     def _members_of_entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         """Return the points or elements of one entry of a set; undefined numbers of a range are ignored."""
@@ -179,7 +179,7 @@ class Assembly:
         item = self._items_of(kind, scope).get(number)
         if item is None:
             where = f" in instance '{self.content.instances[scope].name}'" if scope else ""
-            raise location.refuse(f"{kind} {number} is not defined{where}")
+            raise location.error(f"{kind} {number} is not defined{where}")
         return item
 
     def nodes(self, name: str, location: Location) -> list[int]:
@@ -197,7 +197,7 @@ class Assembly:
         """
         nodes = self.nodes(name, location)
         if len(nodes) != 1:
-            raise location.refuse(f"'{name}' has {len(nodes)} nodes, but one is needed")
+            raise location.error(f"'{name}' has {len(nodes)} nodes, but one is needed")
         return nodes[0]
 
     def faces(self, name: str, location: Location) -> list[Face]:
@@ -209,19 +209,20 @@ class Assembly:
         if definition.of_nodes:
             complete, _, remaining = self.faces_of_nodes(definition, scope)
             if remaining:
-                raise definition.refuse(
+                raise definition.error(
                     f"the nodes of surface '{definition.name}' do not form whole faces: {len(remaining)} belong to none "
                     f"(first: node {self.label_of(remaining[0])}), and *{location.keyword} in line {location.line} "
                     "needs faces, TYPE=ELEMENT"
                 )
             return complete
-        if (label := key_of(name)) not in self.surfaces:
+        if (key := key_of(name)) not in self.surfaces:
             faces: dict[Face, None] = {}
-            for face in definition.faces:
-                members = self.elements_of(face.name if not scope else f"{scope}.{face.name}", face.location)
-                faces.update(dict.fromkeys(entry for element in members for entry in self._faces_of(element, face)))
-            self.surfaces[label] = list(faces)
-        return self.surfaces[label]
+            prefix = f"{scope}." if scope else ""
+            for entry in definition.entries:
+                members = self.elements_of(prefix + entry.name, entry.location)
+                faces.update(dict.fromkeys(face for element in members for face in self._faces_of(element, entry)))
+            self.surfaces[key] = list(faces)
+        return self.surfaces[key]
 
     def surface(self, name: str, location: Location) -> tuple[Surface, str]:
         """Return the definition of a surface and the instance that contains it. Raises CaseError if it is not defined."""
@@ -229,15 +230,15 @@ class Assembly:
         surfaces = self.part(scope).surfaces
         if label not in surfaces:
             names = ", ".join(sorted(surface.name for surface in surfaces.values())) or "none"
-            raise location.refuse(f"surface '{name[:80]}' is not defined; surfaces: {names}")
-        if not surfaces[label].faces:
-            raise surfaces[label].refuse(f"surface '{surfaces[label].name[:80]}' has no faces")
+            raise location.error(f"surface '{name[:LONGEST_QUOTED]}' is not defined; surfaces: {names}")
+        if not surfaces[label].entries:
+            raise surfaces[label].error(f"surface '{surfaces[label].name[:LONGEST_QUOTED]}' has no faces")
         return surfaces[label], scope
 
     def _type_of_solid(self, element: Element, location: Location) -> ElementType:
         """Return the type of an element with faces. Raises CaseError if it is not a solid."""
         if element.type is None:
-            raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
+            raise location.error(f"element {element.number} is not a solid, so it has no faces")
         return element.type
 
     def facet(self, element: Element, label: int, location: Location) -> int:
@@ -247,7 +248,7 @@ class Assembly:
         """
         solid = self._type_of_solid(element, location)
         if not 1 <= label <= len(solid.faces):
-            raise location.refuse(
+            raise location.error(
                 f"element {element.number} of type {solid.name} has no face {label}, only 1 to {len(solid.faces)}"
             )
         return solid.faces[label - 1]
@@ -306,8 +307,9 @@ class Assembly:
 
     def surface_nodes(self, definition: Surface, scope: str) -> list[int]:
         """Return the points of a node-based surface without repetition."""
-        entries = [(face.name if not scope else f"{scope}.{face.name}", face.location) for face in definition.faces]
-        return list(dict.fromkeys(point for name, location in entries for point in self.nodes(name, location)))
+        prefix = f"{scope}." if scope else ""
+        points = (self.nodes(prefix + entry.name, entry.location) for entry in definition.entries)
+        return list(dict.fromkeys(itertools.chain.from_iterable(points)))
 
     def label_of(self, point: int) -> str:
         """Return the label in the deck of the node at a point, with its instance."""
@@ -364,7 +366,7 @@ def assemble(assembly: Assembly) -> None:
         for number, cell in part.cells.items():
             points = tuple(index.get(node, -1) for node in cell.nodes)
             if -1 in points:
-                raise cell.refuse(f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined")
+                raise cell.error(f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined")
             kind = element_type(cell.type)
             row = -1 if kind is None else counts.setdefault(kind.element, 0)
             if kind is not None:
@@ -383,15 +385,15 @@ def _coordinates_in_assembly(part: Part, instance: Instance | None) -> Array:
         (a, b), angle = np.reshape(instance.rotation[:6], (2, 3)), math.radians(instance.rotation[6])
         points = a + (points - a) @ Rotation(tuple(a), tuple(b - a), angle).matrix(angle).T
         size = np.abs(points).max(initial=0.0)
-        points[np.abs(points) < 1e-14 * size] = 0.0
+        points[np.abs(points) < 1e-14 * size] = 0.0  # round-off, for example of the cosine of 90 degrees
     return points
 
 
-# Labels of loads on faces by keyword; those of elements are followed by the number of the face.
-ON_SURFACES = {"DSLOAD": "P", "DSFLUX": "S", "SFILM": "F"}
-ON_FACES = {"DLOAD": "P", "DFLUX": "S", "FILM": "F"}
+# Labels of loads on surfaces and on faces of elements by keyword; the latter are followed by the number of the face.
+SURFACE_LOADS = {"DSLOAD": "P", "DSFLUX": "S", "SFILM": "F"}
+FACE_LOADS = {"DLOAD": "P", "DFLUX": "S", "FILM": "F"}
 # Labels of loads on elements by keyword, with the number of their further entries.
-ON_ELEMENTS = {"DLOAD": {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}, "DFLUX": {"BF": 0}, "FILM": {}}
+ELEMENT_LOADS = {"DLOAD": {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}, "DFLUX": {"BF": 0}, "FILM": {}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -417,13 +419,13 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
     """
     keyword, label = row.location.keyword, row.text(1).upper()
     load = "load " if keyword.endswith("LOAD") else ""
-    if keyword in ON_SURFACES:
-        letter = ON_SURFACES[keyword]
+    if keyword in SURFACE_LOADS:
+        letter = SURFACE_LOADS[keyword]
         if label != letter:
-            raise row.refuse(f"{load}{label[:40]} on a surface is not supported, only {letter}")
+            raise row.error(f"{load}{label[:40]} on a surface is not supported, only {letter}")
         faces = assembly.faces(row.text(0), row.location)
         return [Target(keyword, row.location, letter, face, (), numbers) for face in faces]
-    letter, element_loads = ON_FACES[keyword], ON_ELEMENTS[keyword]
+    letter, element_loads = FACE_LOADS[keyword], ELEMENT_LOADS[keyword]
     on_all_solids = keyword == "DLOAD" and not row.text(0)
     elements = assembly.solids if on_all_solids else assembly.elements_of(row.text(0), row.location)
     if label[:1] == letter and label[1:].isdigit():
@@ -431,8 +433,8 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
         return [Target(keyword, row.location, letter, face, (), numbers) for face in faces]
     if label not in element_loads:
         labels = ", ".join([f"{letter}1", f"{letter}2", "...", *element_loads])
-        raise row.refuse(f"{load}{label[:40]} is not supported; expected one of {labels}")
+        raise row.error(f"{load}{label[:40]} is not supported; expected one of {labels}")
     vector = tuple(row.number(3 + i, 0.0) for i in range(element_loads[label]))
     if vector and not any(vector[-3:]):
-        raise row.refuse(f"the direction of {label} is missing")
+        raise row.error(f"the direction of {label} is missing")
     return [Target(keyword, row.location, label, None, tuple(elements), vector)]

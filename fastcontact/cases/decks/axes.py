@@ -22,16 +22,16 @@ def orientation(content: Content, part: Part, block: Block) -> None:
     rows = block.rows
     points: tuple[float, ...] = ()
     if not rows:
-        raise block.refuse("a data line with six coordinates is needed")
+        raise block.error("a data line with six coordinates is needed")
     distribution = unquoted(rows[0].text(0)) if re.match("[A-Za-z_]", rows[0].text(0)) else ""
     if distribution and system == "CYLINDRICAL":
-        raise block.refuse("a distribution of axes is supported with SYSTEM=RECTANGULAR only")
+        raise block.error("a distribution of axes is supported with SYSTEM=RECTANGULAR only")
     if not distribution:
         points = tuple(rows[0].number(i) for i in range(6))
         if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
-            raise rows[0].refuse("an origin of the axes is not supported: give points relative to 0, 0, 0")
+            raise rows[0].error("an origin of the axes is not supported: give points relative to 0, 0, 0")
     if len(rows) > 1 and rows[1].number(1, 0.0):
-        raise rows[1].refuse("a further rotation of the axes is not supported: rotate the points of the first line")
+        raise rows[1].error("a further rotation of the axes is not supported: rotate the points of the first line")
     axes = Axes(block.location, name, system == "CYLINDRICAL", points, distribution, part)
     register("orientation", name, content.orientations, axes, block)
 
@@ -40,7 +40,7 @@ def distribution_table(content: Content, part: Part, block: Block) -> None:
     """Read *DISTRIBUTION TABLE: the kind of a distribution. Raises CaseError unless it consists of the axes of elements."""
     kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
     if kinds != ["COORD3D", "COORD3D"]:
-        raise block.refuse(f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes")
+        raise block.error(f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes")
 
 
 def distribution(content: Content, part: Part, block: Block) -> None:
@@ -52,7 +52,7 @@ def distribution(content: Content, part: Part, block: Block) -> None:
 def transform(content: Content, block: Block) -> None:
     """Read *TRANSFORM: local axes of nodes."""
     cylindrical = block.choice("TYPE", ("R", "C")) == "C"
-    row = block.only()
+    row = block.only_row()
     points = tuple(row.number(i) for i in range(6))
     content.transforms.append(Axes(block.location, block.required("NSET"), cylindrical, points))
 
@@ -73,7 +73,7 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
     """
     axes: Axes = look_up("orientation", name, content.orientations, location)
     if axes.distribution and location.keyword != "SOLID SECTION":
-        raise location.refuse(
+        raise location.error(
             f"orientation '{name}' varies by element, by a distribution: it can be used in sections only"
         )
     return axes
@@ -86,7 +86,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
     """
     block = assembly.content.distributions.get(key_of(axes.distribution))
     if block is None:
-        raise axes.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
+        raise axes.error(f"distribution '{axes.distribution[:80]}' is not defined")
     scopes = [scope for scope in assembly.scopes if assembly.part(scope) is axes.part]
     default, frame_of = None, {}  # type: Array | None, dict[int, Array]
     for row in block.iter_rows():
@@ -103,7 +103,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
     for element in members:
         axes_of_element = frame_of.get(id(element), default)
         if axes_of_element is None:
-            raise block.refuse(f"element {element.number} has no axes, and there is no default line without an element")
+            raise block.error(f"element {element.number} has no axes, and there is no default line without an element")
         frames[starts[element.solid.element] + element.row] = axes_of_element
     return frames
 
@@ -111,7 +111,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
 def local_axes(axes: Axes, point: Array) -> Array:
     """Return the local axes (3, 3) [-], in rows, at a point. Raises CaseError if they are not defined there."""
     a, b = np.reshape(axes.points, (2, 3))
-    if axes.cylindrical:
+    if axes.cylindrical:  # the first axis is radial, the third one along the axis of the cylinder
         third, first = b - a, point - a
         third = third / max(np.linalg.norm(third), 1e-300)
         first = first - (first @ third) * third
@@ -119,6 +119,6 @@ def local_axes(axes: Axes, point: Array) -> Array:
         first, third = a, np.cross(a, b)
     lengths = np.linalg.norm(first), np.linalg.norm(third)
     if min(lengths) <= LENGTH_ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
-        raise axes.refuse(f"the local axes are not defined at the point {point.tolist()}")
+        raise axes.error(f"the local axes are not defined at the point {point.tolist()}")
     first, third = first / lengths[0], third / lengths[1]
     return np.array([first, np.cross(third, first), third])

@@ -35,7 +35,7 @@ class Location:
     line: int
     keyword: str
 
-    def refuse(self, text: str) -> CaseError:
+    def error(self, text: str) -> CaseError:
         """Return a CaseError whose message is the location followed by `text`."""
         return CaseError(f"{self}: {text}")
 
@@ -49,9 +49,9 @@ class Located:
     __slots__ = ()
     location: Location
 
-    def refuse(self, text: str) -> CaseError:
+    def error(self, text: str) -> CaseError:
         """Return a CaseError whose message is the location of the item followed by `text`."""
-        return self.location.refuse(text)
+        return self.location.error(text)
 
     def __str__(self) -> str:
         return str(self.location)
@@ -83,7 +83,7 @@ class Row(Item):
         text = self.text(index)
         if not text:
             if default is None:
-                raise self.refuse(f"entry {index + 1} is missing: a number is needed")
+                raise self.error(f"entry {index + 1} is missing: a number is needed")
             return default
         return as_number(self.location, text)
 
@@ -91,14 +91,14 @@ class Row(Item):
         """Return an entry as an integer. Raises CaseError as for `number`, and if the entry is not an integer."""
         value = self.number(index, default)
         if value != int(value) or abs(value) > LARGEST_INTEGER:
-            raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
+            raise self.error(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
         return int(value)
 
     def positive(self, index: int, quantity: str, default: float | None = None) -> float:
         """Return an entry as a positive number; otherwise raise CaseError with the name of the `quantity`."""
         value = self.number(index, default)
         if not value > 0:
-            raise self.refuse(f"the {quantity} {value:g} must be positive")
+            raise self.error(f"the {quantity} {value:g} must be positive")
         return value
 
 
@@ -151,7 +151,7 @@ class Block(Item):
         """Return the numbers in all data lines. Raises CaseError if an entry is not a number."""
         return [row.number(i) for row in self.iter_rows() for i, text in enumerate(row.entries) if text]
 
-    def only(self, variable: str = "") -> Row:
+    def only_row(self, variable: str = "") -> Row:
         """Return the only data line. Raises CaseError unless there is exactly one.
 
         If `variable` is given, the message adds that constants that depend on it are not supported.
@@ -159,7 +159,7 @@ class Block(Item):
         rows = self.rows
         if len(rows) != 1:
             text = f"{len(rows)} data lines, but one is needed"
-            raise self.refuse(text + (f": constants that depend on {variable} are not supported" if variable else ""))
+            raise self.error(text + (f": constants that depend on {variable} are not supported" if variable else ""))
         return rows[0]
 
     def get(self, name: str, default: str = "") -> str:
@@ -172,19 +172,19 @@ class Block(Item):
         for option in known:
             if value.replace(" ", "") == option.replace(" ", ""):
                 return option
-        raise self.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; expected one of {', '.join(known)}")
+        raise self.error(f"{name}={value[:LONGEST_QUOTED]} is not supported; expected one of {', '.join(known)}")
 
     def required(self, name: str) -> str:
         """Return the value of a parameter. Raises CaseError if it is missing or has no value."""
         value = self.parameters.get(name)
         if not value:
-            raise self.refuse(f"the parameter {name} is missing")
+            raise self.error(f"the parameter {name} is missing")
         return value
 
 
 @dataclass
 class Source:
-    """State of the reader: folder of the deck, size [byte] and paths of the files read so far, and open files."""
+    """State of reading: folder of the deck, size [byte] and paths of the files read so far, and files being read."""
 
     folder: Path
     size: int = 0
@@ -200,9 +200,9 @@ def as_number(location: Location, text: str) -> float:
     try:
         value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
     except ValueError:
-        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is not a number") from None
+        raise location.error(f"'{text[:LONGEST_QUOTED]}' is not a number") from None
     if "_" in text or value != value or value in (float("inf"), float("-inf")):
-        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is not a usable number")
+        raise location.error(f"'{text[:LONGEST_QUOTED]}' is not a usable number")
     return value
 
 
@@ -264,7 +264,7 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
     for contents in others:
         block = _block(name, number, contents)
         if block.keyword == "INCLUDE":
-            yield from _read_include(block, name, source)
+            yield from _included_blocks(block, source)
             _check_empty(block.lines)
         else:
             yield block
@@ -275,20 +275,20 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
 def _check_lengths(location: Location, contents: bytes) -> None:
     """Raise CaseError if a line of `contents`, which begin at a location, is too long."""
     if match := _LONG_LINE.search(contents):
-        raise replace(location, line=location.line + contents.count(b"\n", 0, match.start())).refuse(_TOO_LONG)
+        raise replace(location, line=location.line + contents.count(b"\n", 0, match.start())).error(_TOO_LONG)
 
 
 def _check_empty(lines: Iterable[Row]) -> None:
     """Raise CaseError if there are data in lines that belong to no keyword."""
     for row in lines:
         if any(row.entries):
-            raise replace(row.location, keyword="").refuse("a data line before any keyword")
+            raise replace(row.location, keyword="").error("a data line before any keyword")
 
 
 def _block(name: str, number: int, contents: bytes) -> Block:
-    """Return the block in line `number` of a file: a keyword line with its continuation lines, and data lines.
+    """Return the block that begins in line `number` of a file: a keyword line with its continuation lines, and data lines.
 
-    Continuation lines follow a line that ends with a comma.
+    A keyword line that ends with a comma is continued in the next line.
     """
     lines = BytesIO(contents)
     text, n_lines = _text(lines.readline()), 1
@@ -299,7 +299,7 @@ def _block(name: str, number: int, contents: bytes) -> Block:
         if not (continuation := _text(line)).startswith("**"):
             text += f" {continuation}"
         if len(text) > LONGEST_LINE:
-            raise location.refuse(_TOO_LONG)
+            raise location.error(_TOO_LONG)
     return Block(location, _parameters(location, text), Lines(replace(location, line=number + n_lines), lines.read()))
 
 
@@ -335,62 +335,63 @@ def _parameters(location: Location, line: str) -> dict[str, str | None]:
         key, equal, value = entry.partition("=")
         key = " ".join(key.upper().split())
         if key in parameters:
-            raise location.refuse(f"the parameter {key} is given twice")
+            raise location.error(f"the parameter {key} is given twice")
         if key:
             parameters[key] = unquoted(value.strip()) if equal else None
     return parameters
 
 
-def _read_include(block: Block, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of an included file.
+def _included_blocks(block: Block, source: Source) -> Iterator[Block]:
+    """Yield the blocks of the file that an *INCLUDE names.
 
     Raises CaseError unless the file exists in the folder of the deck or below.
     """
     file_name = block.required("INPUT")
     for parameter in block.parameters:
         if parameter != "INPUT":
-            raise block.refuse(f"the parameter {parameter} is not supported")
+            raise block.error(f"the parameter {parameter} is not supported")
     shown, path = file_name[:LONGEST_QUOTED], source.folder / file_name.replace("\\", "/")
     try:
         target = path.resolve()
         inside = target.is_relative_to(source.folder)
         exists = inside and target.is_file()
     except (OSError, ValueError, RuntimeError):
-        raise block.refuse(f"'{shown}' is not a file name") from None
+        raise block.error(f"'{shown}' is not a file name") from None
     if not inside:
-        raise block.refuse(
-            f"'{shown}' is outside the folder of the deck: copy the file into or below '{source.folder}'"
-        )
+        raise block.error(f"'{shown}' is outside the folder of the deck: copy the file into or below '{source.folder}'")
     if not exists:
-        raise block.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
+        raise block.error(f"file '{shown}' not found beside the deck, in '{source.folder}'")
     if target in source.open_files:
         target_name = "the deck" if target == source.open_files[0] else f"'{shown}'"
-        raise block.refuse(f"{target_name} includes itself")
+        raise block.error(f"{target_name} includes itself")
     yield from _blocks(target, file_name, source)
 
 
 @contextmanager
-def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
-    """Convert errors of the package in a ``with`` block to CaseError at a location; `about` precedes the message."""
+def errors_at(location: Location | Located, prefix: str = "") -> Iterator[None]:
+    """Convert errors of the package in a ``with`` block to CaseError at a location; `prefix` precedes the message."""
     try:
         yield
     except CaseError:  # its message already names a location
         raise
     except FastcontactError as error:
-        raise at.refuse(f"{about}{error}") from error
+        raise location.error(f"{prefix}{error}") from error
 
 
-def register(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
-    """Add an entry to a table by its name and return the entry. Raises CaseError if the table already has the name."""
+def register(kind: str, name: str, table: dict[str, Entry], entry: Entry, location: Location | Located) -> Entry:
+    """Add an entry to a table by its name and return the entry. Raises CaseError if the table already has the name.
+
+    `kind` describes the entry in messages, for example "orientation".
+    """
     if key_of(name) in table:
-        raise at.refuse(f"{kind} '{name}' is defined twice")
+        raise location.error(f"{kind} '{name}' is defined twice")
     table[key_of(name)] = entry
     return entry
 
 
-def look_up(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
+def look_up(kind: str, name: str, table: Mapping[str, Any], location: Location | Located) -> Any:
     """Return an entry of a table by its name. Raises CaseError, with the names of all entries, if there is none."""
     if key_of(name) not in table:
         names = ", ".join(entry.name for entry in table.values()) or "none"
-        raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {names}")
+        raise location.error(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {names}")
     return table[key_of(name)]

@@ -13,19 +13,19 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks import interactions
 from fastcontact.cases.decks.assembled import Element
 from fastcontact.cases.decks.axes import axes_by_cell, local_axes, orientation_of
-from fastcontact.cases.decks.blocks import key_of, look_up, refusing
+from fastcontact.cases.decks.blocks import errors_at, key_of, look_up
 from fastcontact.cases.decks.conditions import Component, Conditions
 from fastcontact.cases.decks.constraints import add_rotation_points, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
-from fastcontact.cases.decks.gaps import TOUCHING, add_gap_facets, add_gaps, check_discrete
+from fastcontact.cases.decks.gaps import GAP_TOLERANCE, add_gap_facets, add_gaps, check_discrete
 from fastcontact.cases.decks.histories import ByShape, Period
 from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import check_nodes, deck_mesh_of, group_of_surface
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
 from fastcontact.cases.decks.steps import MOST_INCREMENTS
-from fastcontact.contact.integration import all_nodes_carry
+from fastcontact.contact.integration import all_nodes_carry_pressure
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic
@@ -59,7 +59,7 @@ class Building:
         constraints of the model.
     small_strain_cause : str
         Reason why small strains are assumed although a step has NLGEOM; otherwise empty.
-    driven : dict of (int, int) to Table
+    prescribed_motions : dict of (int, int) to Table
         Prescribed motions [length] of nodes of gap elements that belong to no solid, by point and component.
     gap_ends : dict of str to dict of int to int
         Second node of a gap element by its first node, for each contact that consists of gap elements and an obstacle.
@@ -87,7 +87,7 @@ class Building:
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[MultiPointConstraint] = []
-        self.driven: dict[tuple[int, int], Table] = {}
+        self.prescribed_motions: dict[tuple[int, int], Table] = {}
         if only_heat:
             all_points = point_group(self.model, self.assembly, "held", range(mesh.n_points))
             self.model.fix(all_points, "xyz"[: mesh.dim])
@@ -121,26 +121,26 @@ class Building:
             for section in self.assembly.part(scope).sections:
                 material: Material = look_up("material", section.material, self.content.materials, section)
                 if material.law is None and self.content.heat != "uncoupled":
-                    raise material.refuse(f"material '{material.name}' has no *ELASTIC")
+                    raise material.error(f"material '{material.name}' has no *ELASTIC")
                 if self.assembly.dim == 2 and self.assembly.kinematics != "axisymmetric":
                     section_thickness = 1.0 if section.thickness is None else section.thickness
                     if thickness is not None and section_thickness != thickness:
-                        raise section.refuse(
+                        raise section.error(
                             f"thickness {section_thickness:g} after {thickness:g}: plane models have one thickness"
                         )
                     thickness = section_thickness
                 name = f"{scope}.{section.elements}" if scope else section.elements
                 for element in self.assembly.elements_of(name, section.location):
                     if element.section not in (None, section):
-                        raise section.refuse(
+                        raise section.error(
                             f"element {element.number} has a section already, in line {element.section.location.line}"
                         )
                     element.section = section
         if missing := [element for element in self.assembly.solids if element.section is None]:
             cell = missing[0].cell
             count = f"{len(missing)} element" + "s" * (len(missing) > 1)
-            set_text = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.refuse(f"{count} ({missing[0].number}){set_text} has no section, so no material")
+            set_text = f" of set '{cell.element_set}'" if cell.element_set else ""
+            raise cell.error(f"{count} ({missing[0].number}){set_text} has no section, so no material")
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.assembly.solids:
             section = element.assigned_section
@@ -163,7 +163,7 @@ class Building:
         axes = orientation_of(self.content, section.orientation, section.location)
         rotated = {scope for scope, instance in self.content.instances.items() if instance.rotation}
         if axes.part is not self.content.root and any(element.scope in rotated for element in members):
-            raise axes.refuse("axes of a part whose instance is rotated are not supported: give them in the assembly")
+            raise axes.error("axes of a part whose instance is rotated are not supported: give them in the assembly")
         if axes.distribution:
             return axes_by_cell(self.assembly, axes, members)
         if axes.cylindrical:
@@ -180,7 +180,7 @@ class Building:
             if not pair.tied:
                 look_up("surface interaction", pair.interaction, self.content.interactions, pair)
             if key_of(pair.name) in pair_names:
-                raise pair.refuse(f"the pair {pair.name} is given twice")
+                raise pair.error(f"the pair {pair.name} is given twice")
             pair_names.add(key_of(pair.name))
 
     def _supports(self, conditions: Conditions) -> None:
@@ -193,16 +193,16 @@ class Building:
         ends = {e.points[1] for e in self.assembly.discrete if e.cell.type == "GAPUNI"}
         free_ends = ends - self.assembly.solid_points if ends else ends
         for table, period, components in conditions.supports.in_periods():
-            names = [name for name in components if not (period.keeps and name[1] == 0 and name[0] in self.sections)]
-            if names and not period.always:
-                self.local_supports.append(self._temporary_support(conditions, table, period, names))
-            for name in names if period.always else ():
-                point, axis, local = name
+            remaining = [c for c in components if not (period.fixed and c[1] == 0 and c[0] in self.sections)]
+            if remaining and not period.permanent:
+                self.local_supports.append(self._temporary_support(conditions, table, period, remaining))
+            for component in remaining if period.permanent else ():
+                point, axis, local = component
                 if point in free_ends:
-                    self.driven[point, axis] = table
+                    self.prescribed_motions[point, axis] = table
                 elif local:
-                    label = f"the support of {conditions.description(name)} on local axes"
-                    row = self._support_row(conditions, name)
+                    label = f"the support of {conditions.description(component)} on local axes"
+                    row = self._support_row(conditions, component)
                     local_supports.append(MultiPointConstraint(label, row, 1.0, table))
                 else:
                     by_shape.add(axis, table, [point])
@@ -217,18 +217,18 @@ class Building:
             self.model.fix(point_group(self.model, self.assembly, "rotation", rotations), "y")
 
     def _temporary_support(
-        self, conditions: Conditions, table: Table, period: Period, names: Sequence[Component]
+        self, conditions: Conditions, table: Table, period: Period, components: Sequence[Component]
     ) -> TemporaryConstraint:
         """Return the constraint of displacement components that are prescribed in a period."""
         ends = "" if period.ends == np.inf else f" to {period.ends:g}"
         line = f", line {period.location.line}" if period.location else ""
-        label = f"the support of {conditions.description(names[0])}{line}, from {period.begins:g}{ends}"
-        rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
-        return TemporaryConstraint(label, rows, 1.0, table, period.begins, period.ends, keeps=period.keeps)
+        label = f"the support of {conditions.description(components[0])}{line}, from {period.begins:g}{ends}"
+        rows = csr_array(vstack([self._support_row(conditions, component) for component in components]))
+        return TemporaryConstraint(label, rows, 1.0, table, period.begins, period.ends, keeps=period.fixed)
 
-    def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
+    def _support_row(self, conditions: Conditions, component: Component) -> csr_array:
         """Return the constraint row (1, n_dofs) [-] of the displacement component that a support prescribes."""
-        point, axis, local = name
+        point, axis, local = component
         direction = (conditions.directions[point] if local else np.eye(3))[[axis], : self.assembly.dim]
         return rows_along(np.array([point]), direction, self.model.n_dofs)
 
@@ -243,7 +243,7 @@ class Building:
         """Add the contact pairs and ties of the deck."""
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
-            with refusing(pair):
+            with errors_at(pair):
                 options = self._pair_options(pair)
                 if secondary in self.assembly.excluded:
                     options.update(self._node_based_options(pair, secondary))
@@ -253,7 +253,7 @@ class Building:
         """Return the options that exclude nodes from contact: those on the facets, but not in the node-based surface."""
         excluded = point_group(self.model, self.assembly, "without contact", self.assembly.excluded[secondary])
         options: dict[str, Any] = {"excluded": excluded}
-        if all(map(all_nodes_carry, self.assembly.groups[secondary])):
+        if all(map(all_nodes_carry_pressure, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
             pair, f"the nodes of surface '{pair.secondary}' do not form whole faces: of the facets around them, only "
@@ -289,14 +289,14 @@ class Building:
             return {}
         secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
         gaps, positions = nodal_gaps(self.model, secondary, primary, self.assembly.excluded.get(secondary, []))
-        tolerance = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
+        tolerance = GAP_TOLERANCE * float(np.ptp(self.model.mesh.points, axis=0).max())
         if glued:
             if gaps.max() > tolerance or pair.clearance is not None:
-                raise pair.refuse(f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported")
+                raise pair.error(f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported")
             return {}
         if pair.clearance is not None:
             if np.ptp(gaps) > tolerance:
-                raise pair.refuse(
+                raise pair.error(
                     f"*CLEARANCE is supported between sides at a uniform distance only, and these are {gaps.min():.6g} to "
                     f"{gaps.max():.6g} apart"
                 )
@@ -304,7 +304,7 @@ class Building:
         try:
             adjusted_distance = float(pair.adjust)
         except ValueError:
-            raise pair.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
+            raise pair.error(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
         closed = gaps[(gaps <= adjusted_distance) & (np.abs(gaps) > tolerance)]
         if not len(closed):
             return {}
@@ -324,16 +324,17 @@ class Building:
         """
         steps = self.content.steps
         instants = {float(number) for number in range(1, len(steps) + 1)}
-        yields = any(isinstance(law, ElasticPlastic) for law, _ in self.model.materials)
-        if yields or any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
+        plastic = any(isinstance(law, ElasticPlastic) for law, _ in self.model.materials)
+        if plastic or any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
             for number, step in enumerate(steps):
                 count = max(1, round(min(MOST_INCREMENTS, step.period / min(step.increment, step.period))))
                 instants.update(number + k / count for k in range(1, count))  # ends of equal increments
+        # Corners within 1e-6 of the end of a step are that end or belong to a jump, which needs no separate instant.
         for histories in conditions.histories:
             for track in set(histories.tracks.values()):
-                instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
+                instants.update(round(time, 12) for time, _ in track.table if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
-            raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
+            raise steps[0].error(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
 
 

@@ -43,8 +43,12 @@ class Conditions:
         Histories of loads and temperatures by keyword.
     histories : tuple of Histories
         All histories.
+    film_of : dict of (str, face) to Target
+        Film that acts last on each face, by keyword and face.
     reference : float
-        Initial temperature of the bodies where temperatures are computed.
+        Initial temperature of the bodies where temperatures are computed [temperature].
+    directions : dict of int to ndarray (3, 3)
+        Local axes in rows [-], by point, of nodes with *TRANSFORM and of the points that represent their rotations.
     """
 
     def __init__(self, assembly: DeckMesh) -> None:
@@ -91,37 +95,37 @@ class Conditions:
                 history.advance(number, step)
 
     def _load(self, row: Row) -> tuple[list[Any], float, Location]:
-        """Return the points, components or targets, the value and the location of a line of a load or a temperature."""
+        """Return the points, components or targets of a line of a load or a temperature, its value and its location."""
         keyword = row.location.keyword
         if keyword == "TEMPERATURE":
             return temperature_of(self.assembly, row)
         if keyword == "CLOAD":
-            names: list[Any] = self._force_components(row)
+            keys: list[Any] = self._force_components(row)
         elif keyword == "CFLUX":
             if row.integer(1, TEMPERATURE) not in (0, TEMPERATURE):
-                raise row.refuse(f"degree of freedom {row.text(1)} is not 11, the temperature")
-            names = self._points_of_solids(row)
+                raise row.error(f"degree of freedom {row.text(1)} is not 11, the temperature")
+            keys = self._points_of_solids(row)
         elif keyword in ("FILM", "SFILM"):
-            names = self._films(row)
+            keys = self._films(row)
         else:
-            names = targets(self.assembly, row)
-        return names, row.number(2), row.location
+            keys = targets(self.assembly, row)
+        return keys, row.number(2), row.location
 
     def _force_components(self, row: Row) -> list[Component]:
         """Return the components on which the nodal force of a line acts."""
-        component = row.integer(1)
+        number = row.integer(1)
         points = self.assembly.nodes(row.text(0), row.location)
-        names = [self._component(point, component) if 1 <= component <= 6 else None for point in points]
-        if None in names:
-            raise row.refuse(f"a force cannot act on component {component} of this node")
-        return [(*name[:2], name[0] in self.directions) for name in names if name]
+        components = [self._component(point, number) if 1 <= number <= 6 else None for point in points]
+        if None in components:
+            raise row.error(f"a force cannot act on component {number} of this node")
+        return [(*component[:2], component[0] in self.directions) for component in components if component]
 
     def _points_of_solids(self, row: Row) -> list[int]:
         """Return the points of the node set in a line. Raises CaseError if a point belongs to no solid."""
         points = self.assembly.nodes(row.text(0), row.location)
         for point in points:
             if point not in self.assembly.solid_points:
-                raise row.refuse(f"node {self.assembly.label_of(point)} belongs to no solid, so it has no temperature")
+                raise row.error(f"node {self.assembly.label_of(point)} belongs to no solid, so it has no temperature")
         return points
 
     def _films(self, row: Row) -> list[Target]:
@@ -129,20 +133,20 @@ class Conditions:
 
         Raises CaseError if the current step defines both.
         """
-        coefficient, films = row.number(3), self.films
+        coefficient, histories = row.number(3), self.films
         if coefficient < 0.0:
-            raise row.refuse(f"the film coefficient {coefficient:g} must not be negative")
-        names = targets(self.assembly, row, (coefficient,))
-        for film in names:
+            raise row.error(f"the film coefficient {coefficient:g} must not be negative")
+        films = targets(self.assembly, row, (coefficient,))
+        for film in films:
             earlier = self.film_of.get((film.keyword, film.face), film)
-            if earlier != film and earlier in films.step_values:
-                raise row.refuse(
+            if earlier != film and earlier in histories.step_values:
+                raise row.error(
                     f"{coefficient:g} is the second film coefficient of this face in one step, after {earlier.numbers[0]:g}"
                 )
-            if earlier != film and earlier in films.tracks and films.tracks[earlier].alive:
-                films.removals[earlier] = None
+            if earlier != film and earlier in histories.tracks and histories.tracks[earlier].in_effect:
+                histories.removals[earlier] = None
             self.film_of[film.keyword, film.face] = film
-        return names
+        return films
 
     def description(self, component: Component) -> str:
         """Return the description of a displacement component in terms of the deck, for messages."""
@@ -155,11 +159,11 @@ class Conditions:
         """Record a block *BOUNDARY of the current step or, if `precedes_steps` is true, one that precedes all steps."""
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
-            raise block.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
+            raise block.error(f"TYPE={kind} is not supported, only DISPLACEMENT")
         if block.removes_earlier:
             self.supports.remove_earlier()
             self.fixed_temperatures.remove_earlier()
-        driven = False
+        displaced_before_steps = False
         for row in block.iter_rows():
             if row.text(1) == "11":
                 self._fix_temperature(block, row)
@@ -167,51 +171,49 @@ class Conditions:
             points = self.assembly.nodes(row.text(0), row.location)
             components, value = NAMED.get(row.text(1).upper()), 0.0
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
-                raise row.refuse(f"{row.text(1)} is not supported: give the components")
+                raise row.error(f"{row.text(1)} is not supported: give the components")
             if components is None:
                 first = row.integer(1)
                 last, value = row.integer(2, first), row.number(3, 0.0)
                 if not 1 <= first <= last <= 6:
-                    raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
+                    raise row.error(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
                 components = tuple(range(first, last + 1))
-            driven = driven or bool(precedes_steps and value)
+            displaced_before_steps |= bool(precedes_steps and value)
             prescribed = Value(value, block.get("AMPLITUDE"), row.location)
             for point in points:
                 for component in components:
                     self._support(point, component, prescribed, "FIXED" in block.parameters)
-        if driven:
+        if displaced_before_steps:
             self.assembly.content.note(block, "a displacement prescribed before the first step is applied in that step")
 
     def _fix_temperature(self, block: Block, row: Row) -> None:
         """Record the prescribed temperature of nodes in a line of *BOUNDARY."""
         if not self.assembly.content.heat:
-            raise row.refuse(
-                "degree of freedom 11 (temperature) is not within 1 to 6: in static steps use *TEMPERATURE"
-            )
+            raise row.error("degree of freedom 11 (temperature) is not within 1 to 6: in static steps use *TEMPERATURE")
         if "FIXED" in block.parameters:
-            raise row.refuse("FIXED is not supported for temperatures: give their values")
+            raise row.error("FIXED is not supported for temperatures: give their values")
         for point in self._points_of_solids(row):
             value = Value(row.number(3, 0.0), block.get("AMPLITUDE"), row.location)
             self.fixed_temperatures.set_value(point, value)
 
     def _support(self, point: int, component: int, prescribed: Value, fixed: bool) -> None:
-        """Record a support of a point; `fixed` is true for FIXED.
+        """Record a support of a component of a point, counted from 1; `fixed` is true for FIXED.
 
         Raises CaseError if the component does not exist and the prescribed value is not zero.
         """
-        name = self._component(point, component)
-        if name is None:
+        key = self._component(point, component)
+        if key is None:
             if prescribed.value:
-                raise prescribed.location.refuse(f"component {component} does not exist at nodes of this model")
+                raise prescribed.location.error(f"component {component} does not exist at nodes of this model")
             return
-        if name[0] in self.directions:
-            name, sign = self._local_component(*name[:2])
+        if key[0] in self.directions:
+            key, sign = self._local_component(*key[:2])
             prescribed = prescribed._replace(value=sign * prescribed.value)
-        record = self.supports.keep if fixed else self.supports.set_value
-        record(name, prescribed)
+        record = self.supports.fix if fixed else self.supports.set_value
+        record(key, prescribed)
 
     def _component(self, point: int, component: int) -> Component | None:
-        """Return a component of a point or, for rotations, of the point that represents them; None if it does not exist."""
+        """Return a component, counted from 1, of a point or of the point of its rotations; None if it does not exist."""
         dim = self.assembly.dim
         if component <= dim:
             return point, component - 1, False

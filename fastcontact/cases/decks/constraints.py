@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.axes import local_axes, local_directions, orientation_of
-from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, refusing, unquoted
+from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, errors_at, unquoted
 from fastcontact.cases.decks.content import Content, Coupling, Equation, MultiPoint, Pair, SectorEnds
 from fastcontact.cases.decks.meshing import DeckMesh, ascending, group_of_surface
 from fastcontact.elasticity.loads import Traction
@@ -23,8 +23,9 @@ from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows,
 
 # Smallest number of nodes of those kinds of *MPC whose number of nodes is not fixed.
 MIN_NODES = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
-# Tolerance of the tests for collinear points, and for points on the axis relative to squared distances.
-FLAT = 1e-9
+# Relative tolerance of the tests for coincident or collinear nodes, and for nodes on the axis of MEANROT, whose squared
+# distances are compared.
+DEGENERATE = 1e-9
 
 
 def add_rotation_points(deck_mesh: DeckMesh) -> None:
@@ -37,7 +38,7 @@ def add_rotation_points(deck_mesh: DeckMesh) -> None:
         if coupling.rotation:
             deck_mesh.rotations[point] = deck_mesh.node(coupling.rotation, coupling.location)
         elif deck_mesh.kinematics == "axisymmetric":
-            raise coupling.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
+            raise coupling.error("is not supported in axisymmetric models: relate the nodes by *EQUATION")
         else:
             deck_mesh.rotation(point)
         name = deck_mesh.add_points(coupling.reference, [point])
@@ -63,11 +64,11 @@ def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]
     for name, component, coefficient in equation.terms:
         point = deck_mesh.node(name, equation.location)
         if not 1 <= component <= deck_mesh.dim:
-            raise equation.refuse(f"component {component} of '{name}' is not within 1 to {deck_mesh.dim}")
+            raise equation.error(f"component {component} of '{name}' is not within 1 to {deck_mesh.dim}")
         along = axes.get(point, np.eye(3))[component - 1]
         terms += [(point, axis, coefficient * along[axis]) for axis in np.flatnonzero(along[: deck_mesh.dim]).tolist()]
     if not any(coefficient for _, _, coefficient in terms):
-        raise equation.refuse("all coefficients of the equation are zero")
+        raise equation.error("all coefficients of the equation are zero")
     return terms
 
 
@@ -78,7 +79,7 @@ def _pin_rows(deck_mesh: DeckMesh, pin: MultiPoint) -> list[list[Term]]:
     if len(second) == 1:
         second = second * len(first)
     if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
-        raise pin.refuse(
+        raise pin.error(
             f"'{pin.nodes[0]}' and '{pin.nodes[1]}' have {numbers} nodes: the numbers must be equal, or the second number 1, "
             "and no node may be tied to itself"
         )
@@ -86,7 +87,7 @@ def _pin_rows(deck_mesh: DeckMesh, pin: MultiPoint) -> list[list[Term]]:
     return [[(p, axis, 1.0), (q, axis, -1.0)] for p, q in pairs for axis in range(deck_mesh.dim)]
 
 
-def _points(deck_mesh: DeckMesh, coupling: Coupling) -> list[int]:
+def _followers(deck_mesh: DeckMesh, coupling: Coupling) -> list[int]:
     """Return the points that a coupling relates to its reference point, in ascending order.
 
     Raises CaseError if there are none.
@@ -105,7 +106,7 @@ def _points(deck_mesh: DeckMesh, coupling: Coupling) -> list[int]:
     reference = deck_mesh.node(coupling.reference, coupling.location)
     followers = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
     if not followers:
-        raise coupling.refuse(f"'{coupling.group}' contains no nodes that could follow the reference node")
+        raise coupling.error(f"'{coupling.group}' contains no nodes that could follow the reference node")
     return followers
 
 
@@ -117,7 +118,7 @@ def _coupling_rows(deck_mesh: DeckMesh, mesh: Mesh, coupling: Coupling) -> csr_a
     """
     point = deck_mesh.node(coupling.reference, coupling.location)
     reference = ReferencePoint(point, deck_mesh.rotations[point])
-    points = np.array(_points(deck_mesh, coupling), np.intp)
+    points = np.array(_followers(deck_mesh, coupling), np.intp)
     if not coupling.distributing:
         directions = np.array([_directions(deck_mesh, coupling, follower) for follower in points.tolist()])
         return rigid_rows(mesh.points, reference, points, directions)
@@ -126,7 +127,7 @@ def _coupling_rows(deck_mesh: DeckMesh, mesh: Mesh, coupling: Coupling) -> csr_a
     areas = surface.vector(mesh, deck_mesh.kinematics)[:, 0]
     weight = areas[points] / areas[points].sum()
     directions = _directions(deck_mesh, coupling, point)
-    with refusing(coupling):
+    with errors_at(coupling):
         return distributing_rows(mesh.points, reference, points, weight, directions)
 
 
@@ -140,23 +141,28 @@ def _directions(deck_mesh: DeckMesh, coupling: Coupling, point: int) -> Array:
 
 
 def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
-    """Return the equations of a multi-point constraint. Raises CaseError if its nodes or a plane model do not admit it."""
+    """Return the equations of a multi-point constraint.
+
+    PLANE and STRAIGHT: the first three or two nodes determine a plane or a line. Normal to it, the displacement of each
+    further node is that of the affine interpolation between these nodes, so that it remains on the plane or the line. Raises
+    CaseError if the nodes are too few or degenerate, or if the model is plane.
+    """
     if constraint.kind in ("PIN", "TIE"):
         return _pin_rows(deck_mesh, constraint)
     nodes = [point for name in constraint.nodes for point in deck_mesh.nodes(name, constraint.location)]
     nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
     nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
     if len(nodes) < MIN_NODES[constraint.kind] or deck_mesh.dim == 2:
-        raise constraint.refuse(f"{constraint.kind} needs {MIN_NODES[constraint.kind]} different nodes or more, in 3D")
+        raise constraint.error(f"{constraint.kind} needs {MIN_NODES[constraint.kind]} different nodes or more, in 3D")
     coordinates = deck_mesh.points[nodes]
     if constraint.kind == "MEANROT":
         return [_mean_rotation(constraint, nodes, coordinates)]
     relative, k = coordinates - coordinates[0], MIN_NODES[constraint.kind] - 1
     basis = relative[1:k]  # from the first node to the others of the k nodes that determine the line or the plane
-    _, sizes, directions = np.linalg.svd(basis)
-    if sizes[-1] <= FLAT * sizes[0]:
+    _, singular_values, directions = np.linalg.svd(basis)
+    if singular_values[-1] <= DEGENERATE * singular_values[0]:
         degenerate = "two nodes of STRAIGHT coincide" if k == 2 else "three nodes of PLANE lie on a line"
-        raise constraint.refuse(f"the first {degenerate}")
+        raise constraint.error(f"the first {degenerate}")
     components = np.linalg.lstsq(basis.T, relative.T, rcond=None)[0].T
     weights = np.column_stack([1.0 - components.sum(axis=1), components])
     return [
@@ -176,14 +182,14 @@ def _mean_rotation(constraint: MultiPoint, nodes: list[int], coordinates: Array)
     axis, relative = coordinates[-1], coordinates[:-1] - coordinates[:-1].mean(axis=0)
     length = np.linalg.norm(axis)
     if length == 0.0:
-        raise constraint.refuse(
+        raise constraint.error(
             "the coordinates of the last node of MEANROT are the direction of the axis, which must not be zero"
         )
     axis = axis / length
     offset = relative - np.outer(relative @ axis, axis)
     squared = np.einsum("nd,nd->n", offset, offset)
-    if squared.min() <= FLAT * squared.max():
-        raise constraint.refuse("a node of MEANROT lies on the axis through the centre, where it has no angle")
+    if squared.min() <= DEGENERATE * squared.max():
+        raise constraint.error("a node of MEANROT lies on the axis through the centre, where it has no angle")
     arms = np.cross(axis, offset) / squared[:, None] / len(offset)
     arms -= arms.mean(axis=0)
     return [*_terms(nodes[:-1], arms), (nodes[-1], 0, -1.0)]
@@ -219,7 +225,7 @@ def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
     """Yield the location of each data line with the names of its secondary and its primary surface."""
     for row in block.iter_rows():
         if len([entry for entry in row.entries if entry]) != 2:
-            raise row.refuse(f"{kind} needs two surfaces, the secondary and the primary one")
+            raise row.error(f"{kind} needs two surfaces, the secondary and the primary one")
         yield row.location, unquoted(row.text(0)), unquoted(row.text(1))
 
 
@@ -232,13 +238,13 @@ def clearance(content: Content, block: Block) -> None:
         if (pair.secondary.upper(), pair.primary.upper()) == (secondary.upper(), primary.upper()):
             pair.clearance = value
             return
-    raise block.refuse(f"there is no contact pair of '{secondary}' and '{primary}' above this line")
+    raise block.error(f"there is no contact pair of '{secondary}' and '{primary}' above this line")
 
 
 def tie(content: Content, block: Block) -> None:
     """Read *TIE: tied surfaces, or the end surfaces of a cyclic sector."""
     if "CYCLIC SYMMETRY" in block.parameters:
-        block.only()
+        block.only_row()
         ends = [(first, second) for _, first, second in _sides(block, "cyclic symmetry")]
         content.sector_ends.append(SectorEnds(block.location, block.get("NAME"), ends[0]))
         return
@@ -246,7 +252,7 @@ def tie(content: Content, block: Block) -> None:
     if tolerance := block.get("POSITION TOLERANCE"):
         value = as_number(block.location, tolerance)
         if value < 0.0:
-            raise block.refuse(f"POSITION TOLERANCE={value:g} is negative")
+            raise block.error(f"POSITION TOLERANCE={value:g} is negative")
         text = "no effect, the surfaces are tied where they face each other, at any distance, not node by node"
         content.note(block, f"POSITION TOLERANCE={value:g}: {text}")
     if adjust == "YES" and "ADJUST" in block.parameters:
@@ -261,7 +267,7 @@ def equation(content: Content, block: Block) -> None:
         count = first.integer(0)
         terms: list[tuple[str, int, float]] = []
         if not 1 <= count <= MOST_TERMS:
-            raise first.refuse(f"an equation cannot have {count} terms")
+            raise first.error(f"an equation cannot have {count} terms")
         while len(terms) < count:
             row = next(rows, None)
             if row is None:
@@ -269,7 +275,7 @@ def equation(content: Content, block: Block) -> None:
             starts = (start for start in range(0, len(row.entries), 3) if row.text(start))
             terms += [(row.text(start), row.integer(start + 1), row.number(start + 2)) for start in starts]
         if len(terms) != count:
-            raise first.refuse(f"the equation has {len(terms)} terms, {count} are announced")
+            raise first.error(f"the equation has {len(terms)} terms, {count} are announced")
         content.equations.append(Equation(first.location, tuple(terms)))
 
 
@@ -279,23 +285,23 @@ def multi_point(content: Content, block: Block) -> None:
     PIN and TIE give two nodes the same displacement, and BEAM makes the first node follow the second one like a rigid bar.
     PLANE, STRAIGHT and MEANROT continue on lines that begin with a number.
     """
-    started: list[tuple[Row, str, list[str]]] = []
+    unfinished: list[tuple[Row, str, list[str]]] = []
     for row in block.iter_rows():
         kind, nodes = row.text(0).upper(), [unquoted(entry) for entry in row.entries[1:] if entry]
-        if kind.isdecimal() and started:
-            started[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
+        if kind.isdecimal() and unfinished:
+            unfinished[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
         elif kind in MIN_NODES:
-            started.append((row, kind, nodes))
+            unfinished.append((row, kind, nodes))
         elif kind not in ("PIN", "TIE", "BEAM"):
             kinds = ", ".join(("PIN", "TIE", "BEAM", *MIN_NODES))
-            raise row.refuse(f"an MPC of type {kind[:40]} is not supported, only {kinds}")
+            raise row.error(f"an MPC of type {kind[:40]} is not supported, only {kinds}")
         elif len(nodes) != 2:
-            raise row.refuse(f"{kind} needs two nodes, the dependent and the independent one")
+            raise row.error(f"{kind} needs two nodes, the dependent and the independent one")
         elif kind == "BEAM":
             content.couplings.append(Coupling(row.location, nodes[1], nodes[0], "nodes"))
         else:
             content.multi_points.append(MultiPoint(row.location, kind, tuple(nodes)))
-    content.multi_points += [MultiPoint(row.location, kind, tuple(nodes)) for row, kind, nodes in started]
+    content.multi_points += [MultiPoint(row.location, kind, tuple(nodes)) for row, kind, nodes in unfinished]
 
 
 def rigid_body(content: Content, block: Block) -> None:
@@ -311,7 +317,7 @@ def coupling(content: Content, block: Block, inner: Block) -> None:
     for row in inner.iter_rows():
         first, last = row.integer(0), row.integer(1, row.integer(0))
         if not 1 <= first <= last <= 6:
-            raise row.refuse(f"the components {first} to {last} are not within 1 to 6")
+            raise row.error(f"the components {first} to {last} are not within 1 to 6")
         components.update(range(first, last + 1))
     names = block.required("REF NODE"), block.required("SURFACE"), "surface"
     directions = tuple(sorted(components)) or (1, 2, 3, 4, 5, 6)

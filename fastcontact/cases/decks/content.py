@@ -12,13 +12,13 @@ from fastcontact.cases.decks.blocks import Block, Item, Located, Location, key_o
 
 @dataclass(frozen=True, slots=True)
 class Cell(Located):
-    """An element: its type, its node numbers, the location of its *ELEMENT (`block_location`), its line, and its ELSET."""
+    """An element: its type, its node numbers, the location of its *ELEMENT (`block_location`), its line, and its set."""
 
     type: str
     nodes: Sequence[int]
     block_location: Location
     line: int
-    set: str = ""
+    element_set: str = ""
 
     @property
     def location(self) -> Location:  # type: ignore[override]
@@ -53,7 +53,7 @@ class Surface(Located):
     name: str
     location: Location
     of_nodes: bool
-    faces: list[SurfaceEntry] = field(default_factory=list)
+    entries: list[SurfaceEntry] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ class Section(Item):
 class Part:
     """Nodes, elements, sets and surfaces of a part, of the assembly, or of a deck without parts.
 
-    `nodes` contains the row of each node number in `coordinates` [length], which has three numbers for each row.
+    `nodes` contains the row of each node number in `coordinates` [length], which has three numbers for each row. Sets and
+    surfaces are stored by their names in the form used for look-up (`key_of`), and `set_names` contains the original names.
     """
 
     name: str = ""
@@ -105,7 +106,11 @@ class Instance:
 
 @dataclass
 class Material(Located):
-    """A material of the deck; `law` returns the material of the model for given material axes (None: the global axes)."""
+    """A material of the deck.
+
+    `law` returns the material of the model for given material axes (None: the global axes). `density` [mass / volume] and the
+    coefficients of thermal `expansion` [1 / temperature], one or one for each axis, are None if they are not given.
+    """
 
     name: str
     location: Location
@@ -115,14 +120,35 @@ class Material(Located):
     conductivity: Block | None = None
 
     @property
-    def about(self) -> str:
+    def prefix(self) -> str:
         """Beginning of messages about the material."""
         return f"material '{self.name}': "
 
 
 @dataclass
 class Interaction(Located):
-    """Contact properties of surfaces."""
+    """Contact properties of surfaces.
+
+    Attributes
+    ----------
+    penalty : float, list of (float, float), dict or None
+        Penalty [pressure / length], pairs of overclosure [length] and pressure, or the constants of an exponential law, as in
+        the option `penalty` of a contact pair; None for hard contact.
+    friction : float
+        Coefficient of friction [-].
+    stick_slope : float or None
+        Shear traction divided by slip while nodes stick [pressure / length]; None if sticking is exact.
+    kind : str
+        Kind of the contact pair.
+    cohesion : dict of str to Block
+        Blocks of the cohesive layer by keyword.
+    conductance : list of Block
+        Blocks *GAP CONDUCTANCE.
+    friction_heat : (Location, float) or None
+        Fraction [-] of the frictional work that becomes heat, with its location; None if friction generates no heat.
+    friction_changes : list of (int, Interaction)
+        Changes of the friction by later steps: the number of preceding steps, and the new friction.
+    """
 
     name: str
     location: Location
@@ -133,13 +159,16 @@ class Interaction(Located):
     cohesion: dict[str, Block] = field(default_factory=dict)
     conductance: list[Block] = field(default_factory=list)
     friction_heat: tuple[Location, float] | None = None
-    # Number of preceding steps, and new friction.
     friction_changes: list[tuple[int, Interaction]] = field(default_factory=list)
 
 
 @dataclass
 class Pair(Located):
-    """A contact pair or a tie."""
+    """A contact pair or a tie (`tied`) of two surfaces.
+
+    `adjust` is the value of ADJUST, empty without it. `clearance` is the initial gap [length] that replaces the gap in the
+    coordinates; None if the coordinates determine the gap.
+    """
 
     location: Location
     secondary: str
@@ -180,7 +209,12 @@ class MultiPoint(Item):
 
 @dataclass(frozen=True)
 class Coupling(Item):
-    """A rigid body or coupling: a reference node, and the nodes that follow it or, if distributing, that it follows."""
+    """A rigid body or coupling: a reference node, and the nodes that follow it or, if distributing, that it follows.
+
+    `group` is the name of a set of nodes or elements or of a surface, as `kind` states. Of the constrained `components`, 1 to
+    3 are displacements and 4 to 6 rotations. `rotation` is the node whose displacements are the rotations of the reference
+    node; it is empty if there is no such node.
+    """
 
     reference: str
     group: str
@@ -202,7 +236,7 @@ class PretensionSection(Item):
 
 @dataclass(frozen=True)
 class Gap(Item):
-    """Properties of gap elements: initial clearance [length], and vector from the first to the second node."""
+    """Properties of gap elements: initial clearance [length], and direction from the first to the second node [-]."""
 
     clearance: float
     direction: tuple[float, ...]
@@ -242,7 +276,11 @@ class Amplitude(Item):
 
 @dataclass(slots=True)
 class Step(Located):
-    """A load step of the deck."""
+    """A load step of the deck.
+
+    `nonlinear` states whether NLGEOM is active. `period` is the duration of the step and `increment` its initial increment
+    [time]. `n_modes` is the number of modes that *FREQUENCY requests; it is zero in other steps.
+    """
 
     location: Location
     nonlinear: bool = False
@@ -287,6 +325,6 @@ class Content:
     notes: list[str] = field(default_factory=list)
     outputs: list[Location] = field(default_factory=list)
 
-    def note(self, at: Location | Located, text: str) -> None:
+    def note(self, location: Location | Located, text: str) -> None:
         """Add a note on the interpretation of a line."""
-        self.notes.append(f"{at}: {text}")
+        self.notes.append(f"{location}: {text}")

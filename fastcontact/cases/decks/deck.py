@@ -145,10 +145,10 @@ class Deck:
             If the node does not exist.
         """
         assembly = self.building.assembly
-        scope, rest = assembly.split_name(str(number))
-        if not rest.isdecimal() or int(rest[:19]) not in assembly.index[scope]:
+        scope, label = assembly.split_name(str(number))
+        if not label.isdecimal() or int(label[:19]) not in assembly.index[scope]:
             raise MeshError(f"node '{number}' is not defined in '{self.path.name}'")
-        return assembly.index[scope][int(rest[:19])]
+        return assembly.index[scope][int(label[:19])]
 
     def finished(self, step: StepResult) -> StepResult:
         """Return a step of the model as a step of the deck, with the reactions and forces that `solve` describes."""
@@ -158,31 +158,34 @@ class Deck:
             for point, force in zip(contact.points.tolist(), contact.force_vectors, strict=True):
                 reaction[ends[point]] += force
         displacement = step.displacement.copy()
-        for component, table in self.building.driven.items():
+        for component, table in self.building.prescribed_motions.items():
             displacement[component] = table_value(table, step.load_factor)
         step = replace(step, displacement=displacement)
         if self.building.content.steps and step.load_factor == self.ramp.instants[-1]:
             self._warn_of_large_strains(step)
-        t, mesh = self.thickness, self.model.mesh
+        thickness, mesh = self.thickness, self.model.mesh
         references = {
             name: {
-                "force": (t * reaction[mesh.point(name)]).tolist(),
-                "moment": (t * reaction[mesh.point(name + ROTATION), : 2 * mesh.dim - 3]).tolist(),
+                "force": (thickness * reaction[mesh.point(name)]).tolist(),
+                "moment": (thickness * reaction[mesh.point(name + ROTATION), : 2 * mesh.dim - 3]).tolist(),
             }
             for name in mesh.point_groups
             if name + ROTATION in mesh.point_groups
         }
         iterations = step.iterations | ({"reference_reactions": references} if references else {})
-        if t == 1.0:
+        if thickness == 1.0:
             return replace(step, reaction=reaction, iterations=iterations)
         contacts = {
-            name: replace(contact, **{key: t * getattr(contact, key) for key in EXTENSIVE_FIELDS})
+            name: replace(contact, **{key: thickness * getattr(contact, key) for key in EXTENSIVE_FIELDS})
             for name, contact in step.contact.items()
         }
-        sums = {name: _scaled(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
-        heat = None if step.heat_reaction is None else t * step.heat_reaction
-        iterations |= sums
-        return replace(step, reaction=t * reaction, contact=contacts, iterations=iterations, heat_reaction=heat)
+        sums = {
+            name: _scaled(thickness, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)
+        }
+        heat = None if step.heat_reaction is None else thickness * step.heat_reaction
+        return replace(
+            step, reaction=thickness * reaction, contact=contacts, iterations=iterations | sums, heat_reaction=heat
+        )
 
     def _support_reactions(self, reaction: Array, instant: float) -> Array:
         """Return the reactions (n_points, dim) [force] at supports, without the forces of multi-point constraints.
@@ -258,7 +261,7 @@ def read_deck(path: PathLike) -> Deck:
     file = existing_file(path)
     content = read_content(read_blocks(file))
     if not content.steps:
-        raise Location(file.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
+        raise Location(file.name, 1, "STEP").error("the deck has no step, so nothing is loaded")
     try:
         building = Building(content, f"# from the deck {file.name}\n")
     except (ModelError, MeshError, ContactError) as error:

@@ -19,7 +19,7 @@ def initial_conditions(content: Content, block: Block) -> None:
     """Store a block *INITIAL CONDITIONS, which gives nodal temperatures or element stresses before the first step."""
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
-        raise block.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
+        raise block.error(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
     (content.initial_temperatures if kind == "TEMPERATURE" else content.initial_stresses).append(block)
 
 
@@ -32,13 +32,13 @@ def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[in
 def temperature_of(assembly: Assembly, row: Row) -> tuple[list[int], float, Location]:
     """Return the points of a line with a temperature, the temperature and the location."""
     if any(row.entries[2:]):
-        raise row.refuse("temperature gradients exist in beams and shells only: give a single temperature")
+        raise row.error("temperature gradients exist in beams and shells only: give a single temperature")
     value = row.number(1)
     return assembly.nodes(row.text(0), row.location), value, row.location
 
 
 # Stress components in the order of a data line, by the dimension of the mesh.
-ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
+STRESS_ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
 
 
 def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
@@ -47,7 +47,7 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
     Raises CaseError if a line does not have exactly one value per component, or if an element is not a solid or has an
     orientation.
     """
-    content, names = deck_mesh.content, ORDER[deck_mesh.dim]
+    content, names = deck_mesh.content, STRESS_ORDER[deck_mesh.dim]
     if not content.initial_stresses:
         return
     starts = starts_of(model.mesh.solids)
@@ -55,16 +55,16 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
     for block in content.initial_stresses:
         for row in block.iter_rows():
             if len(row.entries) != 1 + len(names):
-                raise row.refuse(
+                raise row.error(
                     f"{len(row.entries)} entries, but {1 + len(names)} are needed: an element or a set, and the components "
                     f"{', '.join(names)} of its stress; stresses by integration point are not supported"
                 )
             numbers = [row.number(index) for index in range(1, 1 + len(names))]
             for element in deck_mesh.elements_of(row.text(0), row.location):
                 if element.type is None:
-                    raise row.refuse(f"element {element.number} is not a solid, so it has no initial stress")
+                    raise row.error(f"element {element.number} is not a solid, so it has no initial stress")
                 if element.section is not None and element.section.orientation:
-                    raise row.refuse(
+                    raise row.error(
                         f"element {element.number} has an *ORIENTATION: initial stresses in local axes are not supported"
                     )
                 values[starts[element.type.element] + element.row] = numbers
@@ -83,19 +83,17 @@ def check_steps(content: Content) -> None:
     content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
         if first and step.heat != first.heat and (first.heat == "uncoupled" or number > content.steps.index(first)):
-            raise step.refuse(
+            raise step.error(
                 "*HEAT TRANSFER cannot be combined with other procedures, and *COUPLED TEMPERATURE-DISPLACEMENT cannot "
                 "precede them: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
             )
         for block in step.conditions:
             if block.keyword in HEAT_LOADS and not step.heat:
-                raise block.refuse("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
+                raise block.error("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:
-                raise block.refuse(
-                    "temperatures are computed in this deck: prescribe degree of freedom 11 by *BOUNDARY"
-                )
+                raise block.error("temperatures are computed in this deck: prescribe degree of freedom 11 by *BOUNDARY")
             if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "uncoupled":
-                raise block.refuse(
+                raise block.error(
                     "is not a heat load: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
                 )
 
@@ -111,7 +109,7 @@ def reference_temperature(assembly: Assembly, initial: Mapping[int, float]) -> f
         return values.pop()
     location = content.initial_temperatures[0].location
     if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
-        raise location.refuse(
+        raise location.error(
             f"initial temperatures from {min(values):g} to {max(values):g} are not supported with thermal expansion in "
             "coupled steps: thermal strains refer to a single temperature"
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.assembled import Assembly, facet_points
-from fastcontact.cases.decks.blocks import Block, key_of, refusing
+from fastcontact.cases.decks.blocks import Block, errors_at, key_of
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.content import Content, Gap, Spring
 from fastcontact.cases.decks.meshing import DeckMesh
@@ -18,15 +18,15 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 # Tolerance of gaps and distances, relative to the size of the model.
-TOUCHING = 1e-6
+GAP_TOLERANCE = 1e-6
 
 
 def gap(content: Content, block: Block) -> None:
     """Read *GAP: the clearance [length] and the direction [-] of gap elements."""
-    row = block.only()
+    row = block.only_row()
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
-        raise row.refuse("the direction of the gap elements is missing")
+        raise row.error("the direction of the gap elements is missing")
     content.gaps[key_of(block.required("ELSET"))] = Gap(block.location, row.number(0), direction)
 
 
@@ -34,9 +34,9 @@ def spring(content: Content, block: Block) -> None:
     """Read *SPRING: the axial stiffness [force / length] of springs."""
     rows = block.rows
     if len(rows) != 1:
-        raise block.refuse("linear springs along their axis need an empty line, followed by a line with the stiffness")
+        raise block.error("linear springs along their axis need an empty line, followed by a line with the stiffness")
     if rows[0].text(1):
-        raise rows[0].refuse("only linear springs are supported: one stiffness")
+        raise rows[0].error("only linear springs are supported: one stiffness")
     content.springs[key_of(block.required("ELSET"))] = Spring(block.location, rows[0].positive(0, "stiffness"))
 
 
@@ -46,11 +46,11 @@ def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Gap |
     for name, entry in properties.items():
         for element in assembly.elements_of(name, entry.location):
             if element.cell.type != kind:
-                raise entry.refuse(f"element {element.number} is not of type {kind}")
+                raise entry.error(f"element {element.number} is not of type {kind}")
             with_properties.add(element)
     for element in assembly.discrete:
         if element.cell.type == kind and element not in with_properties:
-            raise element.cell.refuse(f"element {element.number} of type {kind} has no {keyword}")
+            raise element.cell.error(f"element {element.number} of type {kind} has no {keyword}")
 
 
 def add_gap_facets(deck_mesh: DeckMesh) -> None:
@@ -77,7 +77,7 @@ def _add_facets(deck_mesh: DeckMesh, group: str, points: Indices, gap: Gap) -> N
     selected = set(points.tolist())
     faces = deck_mesh.faces_within(selected)
     if {p for face in faces for p in facet_points(*face)} != selected:
-        raise gap.refuse(
+        raise gap.error(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
         )
     deck_mesh.add_facets(group, faces)
@@ -90,15 +90,15 @@ def add_gaps(model: Model, deck_mesh: DeckMesh, conditions: Conditions) -> dict[
     are not in planes normal to the direction of the elements.
     """
     points, gap_ends = model.mesh.points, {}
-    tolerance = TOUCHING * float(np.ptp(points, axis=0).max())
+    tolerance = GAP_TOLERANCE * float(np.ptp(points, axis=0).max())
     for key, gap in deck_mesh.content.gaps.items():
         name, ends = _name_and_ends(deck_mesh, key, gap)
         direction = np.array(gap.direction)[: deck_mesh.dim] / np.linalg.norm(gap.direction)
         if np.ptp(points[ends[:, 0]] @ direction) > tolerance:
-            raise gap.refuse("gap elements are supported if their nodes lie in a plane normal to their direction")
+            raise gap.error("gap elements are supported if their nodes lie in a plane normal to their direction")
         if (opposite := f"{name} opposite facets") in deck_mesh.groups:
             distance = _distance(points[ends[:, 1]] - points[ends[:, 0]], direction, tolerance, gap)
-            with refusing(gap):
+            with errors_at(gap):
                 model.add_contact(
                     name, secondary=f"{name} facets", primary=opposite, formulation="node_to_segment",
                     clearance=gap.clearance - distance,
@@ -123,7 +123,7 @@ def _distance(vectors: Array, direction: Array, tolerance: float, gap: Gap) -> f
     distances = vectors @ direction
     tangential = np.abs(vectors - np.outer(distances, direction)).max()
     if max(np.ptp(distances), tangential, -distances.mean()) > tolerance:
-        raise gap.refuse("gap elements between bodies are supported along their direction, in planes normal to it only")
+        raise gap.error("gap elements between bodies are supported along their direction, in planes normal to it only")
     return float(distances.mean())
 
 
@@ -135,11 +135,11 @@ def _motion(gap: Gap, ends: Indices, direction: Array, conditions: Conditions) -
     supports = conditions.supports
     by_axis: list[tuple[float, Array]] = []
     for axis in np.flatnonzero(direction).tolist():
-        names = [(end, axis, False) for end in ends[:, 1].tolist()]
-        prescribed = [name for name in names if name in supports.tracks and supports.tracks[name].periods[-1].always]
-        tables = {supports.table(name) for name in prescribed}
-        if len(tables) != 1 or len(prescribed) < len(names):
-            raise gap.refuse(
+        components = [(end, axis, False) for end in ends[:, 1].tolist()]
+        prescribed = [c for c in components if c in supports.tracks and supports.tracks[c].periods[-1].permanent]
+        tables = {supports.table(component) for component in prescribed}
+        if len(tables) != 1 or len(prescribed) < len(components):
+            raise gap.error(
                 "gap elements need second nodes that are fixed, or have the same prescribed motion, along their direction"
             )
         by_axis.append((float(direction[axis]), np.array(tables.pop())))

@@ -13,25 +13,25 @@ from fastcontact.mesh import elements
 
 # Number of nodes of the supported elements that are not solids.
 DISCRETE = {"GAPUNI": 2, "SPRINGA": 2}
-# Smallest number of nodes of an element whose lines may continue without a comma at their end.
+# Smallest number of nodes of an element whose data may continue after a full line that does not end with a comma.
 LONG = 15
 
 
 def nodes(content: Content, part: Part, block: Block) -> None:
     """Read *NODE: numbers and coordinates of nodes."""
     if block.get("SYSTEM", "R").upper() != "R":
-        raise block.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
+        raise block.error(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
     numbers = array("q")
     for row in block.iter_rows():
         number = row.integer(0)
         if len(row.entries) > 4 and any(row.entries[4:]):
-            raise row.refuse(f"node {number} has more than three coordinates")
+            raise row.error(f"node {number} has more than three coordinates")
         position = array("d", (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0)))
         row_of_node = part.nodes.setdefault(number, len(part.nodes))
         if 3 * row_of_node == len(part.coordinates):
             part.coordinates.extend(position)
         elif part.coordinates[3 * row_of_node : 3 * row_of_node + 3] != position:
-            raise row.refuse(f"node {number} is defined twice, at different positions")
+            raise row.error(f"node {number} is defined twice, at different positions")
         numbers.append(number)
     if block.get("NSET"):
         part.add("node", block.get("NSET"), [Members(block.location, numbers)])
@@ -44,7 +44,7 @@ def cells(content: Content, part: Part, block: Block) -> None:
     if kind is None and name not in DISCRETE:
         where = f" in set '{element_set}'" if element_set else ""
         count = sum(1 for _ in _element_rows(block, 0))
-        raise block.refuse(
+        raise block.error(
             f"element type {name[:40]}{unsupported_kind(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
         )
     n_nodes = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
@@ -55,9 +55,9 @@ def cells(content: Content, part: Part, block: Block) -> None:
         number = row.integer(0)
         connectivity = array("q", (row.integer(i) for i, entry in enumerate(row.entries) if i and entry))
         if len(connectivity) != n_nodes:
-            raise row.refuse(f"element {number} of type {name} has {len(connectivity)} nodes, {n_nodes} are needed")
+            raise row.error(f"element {number} of type {name} has {len(connectivity)} nodes, {n_nodes} are needed")
         if number in part.cells:
-            raise row.refuse(f"element {number} is defined twice, first in line {part.cells[number].location.line}")
+            raise row.error(f"element {number} is defined twice, first in line {part.cells[number].location.line}")
         part.cells[number] = Cell(name, connectivity, block.location, row.location.line, element_set)
         members.append(number)
     if element_set:
@@ -85,9 +85,10 @@ def group(content: Content, part: Part, block: Block) -> None:
         if "GENERATE" in block.parameters:
             first, last, increment = row.integer(0), row.integer(1), row.integer(2, 1)
             if increment < 1 or last < first:
-                raise row.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
+                raise row.error(f"the range {first} to {last} by {increment} is empty: it must ascend")
             entries.append(Members(row.location, range(first, last + 1, increment), instance=instance))
             continue
+        # Numbers of 19 digits or more may exceed 64 bits. They are looked up as names, which do not exist.
         for are_numbers, members in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if are_numbers:
                 entries.append(Members(row.location, array("q", map(int, members)), instance=instance))
@@ -104,8 +105,8 @@ def surface(content: Content, part: Part, block: Block) -> None:
     for row in block.iter_rows():
         label = row.text(1).upper()
         if not definition.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
-            raise row.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
-        definition.faces.append(SurfaceEntry(row.location, row.text(0), "" if definition.of_nodes else label))
+            raise row.error(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
+        definition.entries.append(SurfaceEntry(row.location, row.text(0), "" if definition.of_nodes else label))
 
 
 def instance(content: Content, block: Block) -> Instance:
@@ -118,7 +119,7 @@ def instance(content: Content, block: Block) -> Instance:
     if len(rows) > 1:
         new_instance.rotation = tuple(rows[1].number(i) for i in range(7))
     if len(rows) > 2:
-        raise rows[2].refuse("an instance has at most two data lines: a translation and a rotation")
+        raise rows[2].error("an instance has at most two data lines: a translation and a rotation")
     return register("instance", name, content.instances, new_instance, block)
 
 

@@ -16,10 +16,10 @@ from fastcontact.cases.decks.blocks import Block, Location, key_of
 from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
 
-Name = TypeVar("Name", bound=Hashable)
+Key = TypeVar("Key", bound=Hashable)
 # Duration of a jump, relative to the duration of a step.
 JUMP = 1e-9
-# Number of decimals in which scaled histories must agree to be merged.
+# Number of decimals to which histories, scaled to a peak of 1, must agree to be merged.
 DECIMALS = 12
 
 
@@ -33,18 +33,18 @@ class Period:
         Load factors [-] between which it acts.
     location : Location or None
         Line of the deck that prescribes it, if it acts only from a later step on; otherwise None.
-    keeps : bool
+    fixed : bool
         True if the value remains equal to that at the start of the period (FIXED).
     """
 
     begins: float = 0.0
     ends: float = np.inf
     location: Location | None = None
-    keeps: bool = False
+    fixed: bool = False
 
     @property
-    def always(self) -> bool:
-        """Whether all steps belong to the period."""
+    def permanent(self) -> bool:
+        """Whether the period comprises all steps."""
         return self.begins == 0.0 and self.ends == np.inf
 
 
@@ -62,7 +62,7 @@ class Track:
     value_in_total_time: tuple[float, Amplitude] | None = None
 
     @property
-    def alive(self) -> bool:
+    def in_effect(self) -> bool:
         """Whether no step has removed the quantities."""
         return bool(self.periods) and self.periods[-1].ends == np.inf
 
@@ -72,7 +72,7 @@ class Track:
         return self.numbers[-1]
 
     @property
-    def points(self) -> Table:
+    def table(self) -> Table:
         """Pairs of load factor and value."""
         return tuple(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
@@ -88,7 +88,7 @@ class Track:
 
 
 class Value(NamedTuple):
-    """A value of a step, with its amplitude and its location. All names of a line share one object, which saves memory."""
+    """A value of a step, with its amplitude and its location. All keys of a line share one object, which saves memory."""
 
     value: float
     amplitude: str
@@ -96,77 +96,77 @@ class Value(NamedTuple):
 
 
 @dataclass(eq=False)
-class Histories(Generic[Name]):
-    """Histories of loads or supports by name, which is a `Component`, a `Target` or a point.
+class Histories(Generic[Key]):
+    """Histories of loads or supports by key, which is a `Component`, a `Target` or a point.
 
     Attributes
     ----------
     content : Content
         Content of the deck.
     tracks : dict
-        Track by name.
+        Track by key.
     step_values : dict
-        Values of the current step by name.
+        Values of the current step by key.
     removals : dict
-        Names of earlier values that the current step removes.
+        Keys of earlier values that the current step removes.
     baseline : mapping
-        Values in the absence of a load or support, by name.
+        Values in the absence of a load or support, by key.
     initial : dict
-        Values given before all steps by name, which the first step reaches unless it changes or removes them.
-    kept : set
-        Names of the values that the current step keeps (FIXED).
+        Values given before all steps by key, which the first step reaches unless it changes or removes them.
+    fixed_keys : set
+        Keys of the values that the current step fixes at their present size (FIXED).
     default : float
-        Value in the absence of a load or support of a name without `baseline`.
+        Value in the absence of a load or support of a key without `baseline`.
     time : float
         Total time [time] at the start of the current step.
     """
 
     content: Content
-    tracks: dict[Name, Track] = field(default_factory=dict)
-    step_values: dict[Name, Value] = field(default_factory=dict)
-    removals: dict[Name, None] = field(default_factory=dict)
-    baseline: Mapping[Name, float] = field(default_factory=dict)
-    initial: dict[Name, Value] = field(default_factory=dict)
-    kept: set[Name] = field(default_factory=set)
+    tracks: dict[Key, Track] = field(default_factory=dict)
+    step_values: dict[Key, Value] = field(default_factory=dict)
+    removals: dict[Key, None] = field(default_factory=dict)
+    baseline: Mapping[Key, float] = field(default_factory=dict)
+    initial: dict[Key, Value] = field(default_factory=dict)
+    fixed_keys: set[Key] = field(default_factory=set)
     default: float = 0.0
     time: float = 0.0
 
-    def set_value(self, name: Name, value: Value) -> None:
+    def set_value(self, key: Key, value: Value) -> None:
         """Set a value for the current step. Raises CaseError if this step has already set a different value."""
-        earlier = self.step_values.get(name)
+        earlier = self.step_values.get(key)
         if earlier is not None and earlier[:2] != value[:2]:
-            raise value.location.refuse(
+            raise value.location.error(
                 f"{value.value:g} is the second value in this step, after {earlier.value:g} in line "
                 f"{earlier.location.line}: programs interpret this differently, so give one value"
             )
-        self.step_values[name] = value
-        self.removals.pop(name, None)
-        self.kept.discard(name)
+        self.step_values[key] = value
+        self.removals.pop(key, None)
+        self.fixed_keys.discard(key)
 
-    def record(self, block: Block, entries: Iterable[tuple[Iterable[Name], float, Location]]) -> None:
+    def record(self, block: Block, entries: Iterable[tuple[Iterable[Key], float, Location]]) -> None:
         """Set the values of the lines of a block; OP=NEW first removes the earlier values of its keyword."""
         if block.removes_earlier:
             self.remove_earlier(block.keyword)
-        for names, value, location in entries:
+        for keys, value, location in entries:
             shared = Value(value, block.get("AMPLITUDE"), location)
-            for name in names:
-                self.set_value(name, shared)
+            for key in keys:
+                self.set_value(key, shared)
 
-    def keep(self, name: Name, value: Value) -> None:
-        """Keep the value that acts at the end of the last step; if there is none, set the given value."""
-        if name in self.tracks and self.tracks[name].alive:
-            self.step_values[name] = Value(self.tracks[name].last, "", value.location)
-            self.removals.pop(name, None)
+    def fix(self, key: Key, value: Value) -> None:
+        """Fix a value as it is at the end of the last step (FIXED); if there is none, set the given value."""
+        if key in self.tracks and self.tracks[key].in_effect:
+            self.step_values[key] = Value(self.tracks[key].last, "", value.location)
+            self.removals.pop(key, None)
         else:
-            self.set_value(name, value)
-        self.kept.add(name)
+            self.set_value(key, value)
+        self.fixed_keys.add(key)
 
     def remove_earlier(self, keyword: str = "") -> None:
-        """Mark the values of earlier steps for removal, except those whose names have a keyword other than `keyword`."""
+        """Mark the values of earlier steps for removal, except those whose keys have a keyword other than `keyword`."""
         self.initial = {}
-        for name, track in self.tracks.items():
-            if track.alive and name not in self.step_values and getattr(name, "keyword", keyword) == keyword:
-                self.removals[name] = None
+        for key, track in self.tracks.items():
+            if track.in_effect and key not in self.step_values and getattr(key, "keyword", keyword) == keyword:
+                self.removals[key] = None
 
     def advance(self, number: int, step: Step) -> None:
         """Advance to the end of step `number`, counted from 1."""
@@ -174,14 +174,14 @@ class Histories(Generic[Name]):
         self.time += step.period
         current = self.initial | self.step_values if self.initial else self.step_values
         changed: dict[tuple[Any, ...], Track] = {}
-        for name in (*current, *self.removals):
-            previous, baseline, new = self.tracks.get(name), self.baseline.get(name, self.default), current.get(name)
+        for key in (*current, *self.removals):
+            previous, baseline, new = self.tracks.get(key), self.baseline.get(key, self.default), current.get(key)
             value, amplitude = new[:2] if new else (baseline, "")
-            periods = self._periods(name, new, start_factor)
-            key = previous, value, amplitude, baseline, periods
-            if key not in changed:
+            periods = self._periods(key, new, start_factor)
+            evolution = previous, value, amplitude, baseline, periods
+            if evolution not in changed:
                 numbers = array("d", (0.0, baseline)) if previous is None else previous.numbers[:]
-                track = changed[key] = Track(numbers, periods)
+                track = changed[evolution] = Track(numbers, periods)
                 track.add([(start_factor, track.last)])
                 if amplitude:
                     history = self.content.amplitudes[key_of(amplitude)]
@@ -189,83 +189,83 @@ class Histories(Generic[Name]):
                     track.value_in_total_time = (value, history) if history.total else None
                 else:
                     track.add([(start_factor + 1, value)])
-            self.tracks[name] = changed[key]
+            self.tracks[key] = changed[evolution]
         continued = {track: pair for track in self.tracks.values() if (pair := track.value_in_total_time) is not None}
         for track in continued.keys() - changed.values():
             track.add(_amplitude_points(*continued[track], start_factor, start_time, step.period))
-        self.step_values, self.initial, self.removals, self.kept = {}, {}, {}, set()
+        self.step_values, self.initial, self.removals, self.fixed_keys = {}, {}, {}, set()
 
-    def _periods(self, name: Name, new: Value | None, begin: float) -> tuple[Period, ...]:
+    def _periods(self, key: Key, new: Value | None, begin: float) -> tuple[Period, ...]:
         """Return the periods of a quantity with the value `new` in the current step, which begins at load factor `begin`.
 
         A new value ends the period of a value with FIXED, and a new period begins.
         """
-        previous, keeps = self.tracks.get(name), name in self.kept
+        previous, fixed = self.tracks.get(key), key in self.fixed_keys
         periods = previous.periods if previous else ()
-        if previous and previous.alive:
-            if new is not None and (keeps or not periods[-1].keeps):
+        if previous and previous.in_effect:
+            if new is not None and (fixed or not periods[-1].fixed):
                 return periods
             periods = (*periods[:-1], replace(periods[-1], ends=begin))
         if new is None:
             return periods
-        return (*periods, Period(begin, location=new.location if begin else None, keeps=keeps))
+        return (*periods, Period(begin, location=new.location if begin else None, fixed=fixed))
 
-    def table(self, name: Name) -> Table:
+    def table(self, key: Key) -> Table:
         """Return the history as pairs of load factor and value, up to the end of the last step of the deck."""
-        points, end = self.tracks[name].points, float(len(self.content.steps))
-        return points if points[-1][0] >= end else (*points, (end, points[-1][1]))
+        table, end = self.tracks[key].table, float(len(self.content.steps))
+        return table if table[-1][0] >= end else (*table, (end, table[-1][1]))
 
-    def distinct(self) -> Iterator[tuple[Table, list[Name]]]:
-        """Yield each distinct history with the names that share it."""
-        members: dict[bytes, list[Name]] = {}
-        for name, track in self.tracks.items():
-            members.setdefault(track.numbers.tobytes(), []).append(name)
-        for names in members.values():
-            yield self.table(names[0]), names
+    def distinct(self) -> Iterator[tuple[Table, list[Key]]]:
+        """Yield each distinct history with the keys that share it."""
+        members: dict[bytes, list[Key]] = {}
+        for key, track in self.tracks.items():
+            members.setdefault(track.numbers.tobytes(), []).append(key)
+        for keys in members.values():
+            yield self.table(keys[0]), keys
 
-    def in_periods(self) -> Iterator[tuple[Table, Period, list[Name]]]:
-        """Yield each distinct history with each period in which it acts, and the names that share both."""
-        for table, names in self.distinct():
-            members: dict[Period, list[Name]] = {}
-            for name in names:
-                for period in self.tracks[name].periods:
-                    members.setdefault(period, []).append(name)
+    def in_periods(self) -> Iterator[tuple[Table, Period, list[Key]]]:
+        """Yield each distinct history with each period in which it acts, and the keys that share both."""
+        for table, keys in self.distinct():
+            members: dict[Period, list[Key]] = {}
+            for key in keys:
+                for period in self.tracks[key].periods:
+                    members.setdefault(period, []).append(key)
             yield from ((table, period, group) for period, group in members.items() if period.begins < period.ends)
 
 
-class ByShape(Generic[Name]):
+class ByShape(Generic[Key]):
     """Histories of nodes, facets or cells, grouped by a key, such as an axis, and by shape, so that few loads are needed.
 
-    Iteration yields the key, the points, the value and the history of each group. The value is 1 if all points have the same
-    history; otherwise it is a function that returns one value for each point, with the points in ascending order.
+    Iteration yields the key, the numbers of the members, the value and the history of each group. The value is 1 if all
+    members have the same history; otherwise it is a function that returns one value for each member, in ascending order.
     """
 
     def __init__(self) -> None:
-        self._members: dict[tuple[Name, Table], tuple[Table, array[float], array[int]]] = {}
+        self._members: dict[tuple[Key, Table], tuple[Table, array[float], array[int]]] = {}
 
-    def add(self, key: Name, table: Table, points: Sequence[int]) -> None:
-        """Add the history of some points under a key."""
+    def add(self, key: Key, table: Table, numbers: Sequence[int]) -> None:
+        """Add the history of the nodes, facets or cells with these `numbers` under a key."""
         peak = max((value for _, value in table), key=abs)
         shape = tuple((factor, round(value / peak, DECIMALS)) for factor, value in table) if peak else table
         _, peaks, members = self._members.setdefault((key, shape), (table, array("d"), array("q")))
-        peaks.extend([peak] * len(points))
-        members.extend(points)
+        peaks.extend([peak] * len(numbers))
+        members.extend(numbers)
 
     @staticmethod
     def of(histories: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
         """Return the histories of scalar quantities, whose key is 0."""
         by_shape = ByShape[int]()
-        for table, points in histories:
-            by_shape.add(0, table, points)
+        for table, numbers in histories:
+            by_shape.add(0, table, numbers)
         return by_shape
 
-    def __iter__(self) -> Iterator[tuple[Name, Indices, Any, Table]]:
+    def __iter__(self) -> Iterator[tuple[Key, Indices, Any, Table]]:
         for (key, shape), (table, peaks, members) in self._members.items():
-            points, inverse = np.unique(members, return_inverse=True)
-            if len(points) == len(members) and min(peaks) == max(peaks):
+            numbers, inverse = np.unique(members, return_inverse=True)
+            if len(numbers) == len(members) and min(peaks) == max(peaks):
                 yield key, np.asarray(members), 1.0, table
-            else:  # several values at a point are added
-                yield key, points, partial(repeated_values, np.bincount(inverse, peaks).astype(float)), shape
+            else:  # several values of a member are added
+                yield key, numbers, partial(repeated_values, np.bincount(inverse, peaks).astype(float)), shape
 
 
 def repeated_values(values: Array, positions: Array) -> Array:

@@ -7,17 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, look_up, refusing, register
+from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, errors_at, look_up, register
 from fastcontact.cases.decks.content import Content, Interaction, Step
 from fastcontact.cases.decks.histories import JUMP
-from fastcontact.contact.cohesion import ELASTIC
+from fastcontact.contact.cohesion import INITIATION_RATIO
 from fastcontact.contact.conductance import Conductance
 from fastcontact.contact.overclosure import TabularLaw
 from fastcontact.errors import ContactError
 from fastcontact.model.model import Model
 
+# Criteria of damage initiation and mixed-mode laws of the package, by their names in decks.
 INITIATIONS = {"QUADS": "quadratic", "MAXS": "maximum"}
-MODES = {"BK": "bk", "POWER LAW": "power"}
+MIXED_MODE_LAWS = {"BK": "bk", "POWER LAW": "power"}
 # Conductance of ties relative to the conductivity over the size of the model. The temperatures of the sides then differ by
 # about the inverse of this number, relative to the variation of the temperature.
 PERFECT = 1e8
@@ -48,9 +49,9 @@ def behaviour(content: Content, current: Interaction, block: Block) -> None:
     """Read *SURFACE BEHAVIOR: hard or tied contact, a linear, tabular or exponential penalty law, and separation."""
     law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))
     if law == "LINEAR":
-        current.penalty = block.only().positive(0, "slope")
+        current.penalty = block.only_row().positive(0, "slope")
     elif law == "EXPONENTIAL":
-        row = block.only()
+        row = block.only_row()
         current.penalty = {"clearance": row.positive(0, "clearance"), "pressure": row.positive(1, "pressure")}
     elif law == "TABULAR":
         current.penalty = _table(block)
@@ -66,23 +67,21 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
     try:
         TabularLaw("", points)
     except ContactError:
-        raise block.refuse(
-            "TABULAR needs ascending pressures and overclosures, with a first pressure of zero"
-        ) from None
+        raise block.error("TABULAR needs ascending pressures and overclosures, with a first pressure of zero") from None
     return points[1][1] / points[1][0] if len(points) == 2 and points[0][0] == 0.0 else points
 
 
 def friction(content: Content, current: Interaction, block: Block) -> None:
     """Read *FRICTION: the coefficient of friction and, as in CalculiX, the stick slope [pressure / length]."""
-    row = block.only()
+    row = block.only_row()
     current.friction = row.number(0)
     if current.friction < 0:
-        raise row.refuse(f"the coefficient of friction {current.friction:g} is negative")
+        raise row.error(f"the coefficient of friction {current.friction:g} is negative")
     if row.text(1) and row.number(1):
         current.stick_slope = row.positive(1, "stick slope")
         content.note(row, f"{current.stick_slope:g} is the stick slope, shear traction divided by slip, as in CalculiX")
     if len(row.entries) > 2 and any(row.entries[2:]):
-        raise row.refuse("friction that depends on pressure or temperature is not supported: give one coefficient")
+        raise row.error("friction that depends on pressure or temperature is not supported: give one coefficient")
 
 
 def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
@@ -93,20 +92,22 @@ def gap_conductance(content: Content, current: Interaction, block: Block) -> Non
 def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
     """Read *GAP HEAT GENERATION: the fraction of the frictional work that becomes heat, half of which enters each side."""
     row = block.rows[0] if block.rows else Row(block.location, ())
-    share, secondary = row.number(0, 1.0), row.number(1, 0.5)
-    if not 0.0 <= share <= 1.0:
-        raise row.refuse(f"the fraction {share:g} of the frictional work that becomes heat must lie between 0 and 1")
-    if secondary != 0.5:
-        raise row.refuse(f"the fraction of the heat on the secondary side must be 0.5, not {secondary:g}")
+    heat_fraction, secondary_fraction = row.number(0, 1.0), row.number(1, 0.5)
+    if not 0.0 <= heat_fraction <= 1.0:
+        raise row.error(
+            f"the fraction {heat_fraction:g} of the frictional work that becomes heat must lie between 0 and 1"
+        )
+    if secondary_fraction != 0.5:
+        raise row.error(f"the fraction of the heat on the secondary side must be 0.5, not {secondary_fraction:g}")
     if row.number(2, 0.0) > 0.0:
-        raise row.refuse("a prescribed sliding velocity is not supported")
-    current.friction_heat = block.location, share
+        raise row.error("a prescribed sliding velocity is not supported")
+    current.friction_heat = block.location, heat_fraction
 
 
 def store(content: Content, current: Interaction, block: Block) -> None:
     """Store *COHESIVE BEHAVIOR, *DAMAGE INITIATION or *DAMAGE EVOLUTION, which are interpreted together."""
     if block.keyword in current.cohesion:
-        raise block.refuse(f"surface interaction '{current.name}' has this keyword twice")
+        raise block.error(f"surface interaction '{current.name}' has this keyword twice")
     current.cohesion[block.keyword] = block
 
 
@@ -114,7 +115,7 @@ def kind_and_friction_of(content: Content, law: Interaction) -> dict[str, Any]:
     """Return the kind, the penalty and the friction of a pair without a cohesive layer."""
     options: dict[str, Any] = {} if law.kind == "unilateral" else {"kind": law.kind}
     if options and (law.friction or law.friction_changes):
-        raise law.refuse(f"friction with {law.kind} contact is not supported")
+        raise law.error(f"friction with {law.kind} contact is not supported")
     if law.penalty is not None and law.kind != "tied":
         options["penalty"] = law.penalty
     options |= _friction_of(law, len(content.steps))
@@ -126,11 +127,11 @@ def _friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
     table, stick_slopes = [(0.0, law.friction)], {law.stick_slope} if law.friction else set()
     for n_before, changed in law.friction_changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.refuse("must be followed by *FRICTION and by no other change of the interaction")
+            raise changed.error("must be followed by *FRICTION and by no other change of the interaction")
         table += [(float(n_before), table[-1][1]), (n_before + JUMP, changed.friction)]
         stick_slopes |= {changed.stick_slope} if changed.friction else set()
         if len(stick_slopes) > 1:
-            raise changed.refuse("a change of the stick slope is not supported: repeat the earlier slope")
+            raise changed.error("a change of the stick slope is not supported: repeat the earlier slope")
     largest = max(value for _, value in table)
     if not largest:
         return {}
@@ -151,21 +152,22 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
     behaviour, initiation, evolution = map(blocks.get, names)
     if behaviour is None:
         first = next(iter(blocks.values()))
-        raise first.refuse(f"surface interaction '{law.name}' has no *COHESIVE BEHAVIOR")
+        raise first.error(f"surface interaction '{law.name}' has no *COHESIVE BEHAVIOR")
     if law.friction or law.friction_changes or law.penalty is not None or law.kind != "unilateral":
-        raise behaviour.refuse("a cohesive layer excludes *FRICTION, NO SEPARATION, and tied or soft contact")
+        raise behaviour.error("a cohesive layer excludes *FRICTION, NO SEPARATION, and tied or soft contact")
     stiffness = _stiffness(behaviour)
     if initiation is None and evolution is None and stiffness is None:
         content.note(behaviour, "the layer has neither stiffness nor damage, so the sides are tied")
         return {"kind": "tied"}
     if initiation is None or evolution is None:
-        raise behaviour.refuse("*DAMAGE INITIATION and *DAMAGE EVOLUTION are both needed")
+        raise behaviour.error("*DAMAGE INITIATION and *DAMAGE EVOLUTION are both needed")
     strength, shear = _opening_and_shear(initiation, "strengths")
     criterion = INITIATIONS[initiation.choice("CRITERION", tuple(INITIATIONS))]
     constants = {"strength": strength, "shear_strength": shear, "initiation": criterion}
     constants.update(_evolution(evolution, constants, stiffness))
     if stiffness is None:
-        content.note(behaviour, f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which it fails")
+        opening = f"{INITIATION_RATIO:g} of the opening at which it fails"
+        content.note(behaviour, f"without a stiffness, damage begins at {opening}")
     else:
         constants["stiffness"] = stiffness
     content.note(behaviour, "sides that are pressed together have the stiffness of the layer, even where it is broken")
@@ -178,10 +180,10 @@ def _stiffness(block: Block) -> float | None:
     block.choice("ELIGIBILITY", ("CURRENT CONTACTS", "ORIGINAL CONTACTS"))
     if not block.rows:
         return None
-    row = block.only("modes or fields")
+    row = block.only_row("modes or fields")
     values = {row.number(index, row.number(0)) for index in range(3)}
     if len(values) > 1:
-        raise row.refuse("a layer must have the same stiffness for opening and for sliding")
+        raise row.error("a layer must have the same stiffness for opening and for sliding")
     return row.positive(0, "stiffness")
 
 
@@ -190,31 +192,29 @@ def _evolution(block: Block, initiation: dict[str, Any], stiffness: float | None
     block.choice("SOFTENING", ("LINEAR",))
     block.choice("MODE MIX RATIO", ("ENERGY",))
     kind = block.choice("TYPE", ("DISPLACEMENT", "ENERGY"))
-    mode = block.choice("MIXED MODE BEHAVIOR", ("TABULAR", *MODES))
-    if kind == "ENERGY" and mode in MODES:
+    mode = block.choice("MIXED MODE BEHAVIOR", ("TABULAR", *MIXED_MODE_LAWS))
+    if kind == "ENERGY" and mode in MIXED_MODE_LAWS:
         energy, shear = _opening_and_shear(block, "energies")
         power = as_number(block.location, block.required("POWER"))
-        return {"energy": energy, "shear_energy": shear, "mixed_mode": MODES[mode], "exponent": power}
-    if mode in MODES:
-        raise block.refuse(f"MIXED MODE BEHAVIOR={mode} requires TYPE=ENERGY")
-    value = block.only("modes or fields").positive(0, "number")
+        return {"energy": energy, "shear_energy": shear, "mixed_mode": MIXED_MODE_LAWS[mode], "exponent": power}
+    if mode in MIXED_MODE_LAWS:
+        raise block.error(f"MIXED MODE BEHAVIOR={mode} requires TYPE=ENERGY")
+    value = block.only_row("modes or fields").positive(0, "number")
     if kind == "ENERGY":
         return {"energy": value, "shear_energy": value}
     strength = initiation["strength"]
     if initiation["initiation"] != "quadratic" or initiation["shear_strength"] != strength:
-        raise block.refuse(
-            "TYPE=DISPLACEMENT is supported only with CRITERION=QUADS and equal strengths: give energies"
-        )
-    failure_opening = value / (1.0 - ELASTIC) if stiffness is None else strength / stiffness + value
+        raise block.error("TYPE=DISPLACEMENT is supported only with CRITERION=QUADS and equal strengths: give energies")
+    failure_opening = value / (1.0 - INITIATION_RATIO) if stiffness is None else strength / stiffness + value
     return {"energy": 0.5 * strength * failure_opening}
 
 
 def _opening_and_shear(block: Block, quantity: str) -> tuple[float, float]:
     """Return the numbers for opening and for sliding. Raises CaseError if those of the two shear directions differ."""
-    row = block.only("modes or fields")
+    row = block.only_row("modes or fields")
     values = [row.positive(index, "number") for index in range(3)]
     if values[1] != values[2]:
-        raise row.refuse(
+        raise row.error(
             f"the {quantity} along both shear directions must be the same, not {values[1]:g} and {values[2]:g}"
         )
     return values[0], values[1]
@@ -226,9 +226,9 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
     for block in law.conductance:
         rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
         if len({row.number(2, 0.0) for row in block.rows}) > 1:
-            raise block.refuse("a conductance that depends on the temperature is not supported: give one table")
+            raise block.error("a conductance that depends on the temperature is not supported: give one table")
         if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
-            raise block.refuse("needs conductances with ascending pressures or clearances")
+            raise block.error("needs conductances with ascending pressures or clearances")
         if len(rows) == 1:
             constant = rows[0][1]
             continue
@@ -241,10 +241,10 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
         if variable == "pressure" and content.heat == "uncoupled":
             content.note(block, "steps with heat alone have no pressures: closed contact conducts as at zero pressure")
     if constant is not None and tables:
-        raise law.conductance[0].refuse("a constant conductance and a table are given: leave out one of them")
+        raise law.conductance[0].error("a constant conductance and a table are given: leave out one of them")
     if constant is None and not tables:
         return {}
-    with refusing(law.conductance[0]):
+    with errors_at(law.conductance[0]):
         Conductance(law.name, tables or constant)
     return {"conductance": tables or constant}
 
@@ -258,11 +258,11 @@ def _friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
         if law.conductance:
             content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
         return {}
-    location, share = law.friction_heat
+    location, heat_fraction = law.friction_heat
     periods = {step.period for step in content.steps}
     if len(periods) > 1:
-        raise location.refuse("frictional heating is supported only if all steps have the same duration")
-    return {"friction_heat": share / periods.pop()}
+        raise location.error("frictional heating is supported only if all steps have the same duration")
+    return {"friction_heat": heat_fraction / periods.pop()}
 
 
 def perfect_conductance(content: Content, model: Model, location: Location) -> Any:

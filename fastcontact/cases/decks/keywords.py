@@ -50,8 +50,8 @@ def heading(content: Content, block: Block) -> None:
     content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
 
 
-def without_effect(text: str) -> Callable[..., None]:
-    """Return the reading function of a keyword without effect, which only records the note `text`."""
+def ignore_with_note(text: str) -> Callable[..., None]:
+    """Return the reading function of a keyword that has no effect apart from the note `text`."""
     return lambda content, *owner_and_block: content.note(owner_and_block[-1], text)
 
 
@@ -99,7 +99,7 @@ TRANSLATED = {
     "HYPERELASTIC": Keyword("material", materials.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
     "PLASTIC": Keyword("material", materials.plastic, "HARDENING"),
     "SPECIFIC HEAT": Keyword(
-        "material", without_effect("no effect, because heat conduction is steady or temperatures are given"), ANYTHING
+        "material", ignore_with_note("no effect, because heat conduction is steady or temperatures are given"), ANYTHING
     ),
     # Below *SURFACE INTERACTION.
     "COHESIVE BEHAVIOR": Keyword("interaction", interactions.store, "TYPE; ELIGIBILITY"),
@@ -108,7 +108,7 @@ TRANSLATED = {
     ),
     "DAMAGE INITIATION": Keyword("interaction", interactions.store, "CRITERION"),
     "DAMAGE STABILIZATION": Keyword(
-        "interaction", without_effect("no effect: damage has no viscous regularisation"), ANYTHING
+        "interaction", ignore_with_note("no effect: damage has no viscous regularisation"), ANYTHING
     ),
     "FRICTION": Keyword("interaction", interactions.friction),
     "GAP CONDUCTANCE": Keyword("interaction", interactions.gap_conductance, "PRESSURE"),
@@ -123,7 +123,7 @@ TRANSLATED = {
     "GAP": Keyword("model", gaps.gap, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", fields.initial_conditions, "TYPE"),
     "MPC": Keyword("model", constraints.multi_point),
-    "PHYSICAL CONSTANTS": Keyword("model", without_effect("no effect: there is no radiation"), ANYTHING),
+    "PHYSICAL CONSTANTS": Keyword("model", ignore_with_note("no effect: there is no radiation"), ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", sections.pretension_section, "SURFACE; NODE"),
     "RIGID BODY": Keyword("model", constraints.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
     "SPRING": Keyword("model", gaps.spring, "ELSET"),
@@ -178,41 +178,42 @@ _REASONS = {
     ),
 }
 REFUSED = {name: reason for reason, names in _REASONS.items() for name in names.split("; ")}
-_SPELLED = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFUSED)}
+# Keywords with their usual blanks, by keyword without blanks.
+_STANDARD_SPELLING = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFUSED)}
 
 
 def with_standard_blanks(block: Block) -> Block:
     """Return a block with the usual blanks in its keyword and parameters, which CalculiX also accepts without blanks."""
-    keyword = _SPELLED.get(block.keyword.replace(" ", ""), block.keyword)
+    keyword = _STANDARD_SPELLING.get(block.keyword.replace(" ", ""), block.keyword)
     entry = TRANSLATED.get(keyword)
     names = {name.replace(" ", ""): name for name in entry.parameters} if entry else {}
     parameters = {names.get(name.replace(" ", ""), name): value for name, value in block.parameters.items()}
     return replace(block, location=replace(block.location, keyword=keyword), parameters=parameters)
 
 
-def keyword_properties(block: Block, about: str) -> Keyword:
+def keyword_properties(block: Block, prefix: str) -> Keyword:
     """Return the properties of a keyword.
 
     Raises CaseError if the keyword or one of its parameters is unknown or not supported. Messages about keywords outside the
-    scope of the package begin with `about`.
+    scope of the package begin with `prefix`.
     """
     keyword = block.keyword
     if keyword in REFUSED:
-        raise block.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
+        raise block.error(f"{prefix}*{keyword} {REFUSED[keyword]}")
     entry = TRANSLATED.get(keyword)
     if entry is None:
         similar = difflib.get_close_matches(keyword, [*TRANSLATED, *OUTPUT, *REFUSED, "INCLUDE"], n=1, cutoff=0.6)
         suggestion = f": did you mean *{similar[0]}?" if similar else ""
-        raise block.refuse(f"unknown keyword *{keyword}{suggestion}")
+        raise block.error(f"unknown keyword *{keyword}{suggestion}")
     for name in block.parameters:
         if entry.used != ANYTHING and name not in entry.parameters:
             accepted = ", ".join(sorted(entry.parameters)) or "none"
-            raise block.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {accepted}")
+            raise block.error(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {accepted}")
     return entry
 
 
 # Contexts that require an open material, interaction, coupling or step, with the message if none is open.
-OWNERS = {
+MISSING_OWNERS = {
     "material": "belongs below *MATERIAL",
     "interaction": "belongs below *SURFACE INTERACTION",
     "coupling": "belongs below *COUPLING",
@@ -240,28 +241,28 @@ class Reader:
         if keyword in OUTPUT:
             content.outputs.append(block.location)
             return
-        properties = keyword_properties(block, self.material.about if self.material else "")
+        properties = keyword_properties(block, self.material.prefix if self.material else "")
         context = properties.context
         if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
-            raise self.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+            raise self.coupling.error("*KINEMATIC or *DISTRIBUTING must follow")
         if self.material is not None and keyword in COHESIVE_DAMAGE:
-            raise block.refuse(f"{self.material.about}damage is supported for cohesive layers only, not in bodies")
+            raise block.error(f"{self.material.prefix}damage is supported for cohesive layers only, not in bodies")
         owner = {
             "part": self.part or content.root, "material": self.material, "interaction": self.interaction,
             "coupling": self.coupling, "procedure": self.step, "step": self.step,
         }.get(context)  # fmt: skip
-        if owner is None and context in OWNERS:
-            raise block.refuse(OWNERS[context])
+        if owner is None and context in MISSING_OWNERS:
+            raise block.error(MISSING_OWNERS[context])
         if context != "material":
             self.material = None
         if context not in ("material", "interaction"):
             self.interaction = None
         if context in ("part", "property", "model") and keyword != "AMPLITUDE" and self.step is not None:
-            raise block.refuse("cannot be inside a step")
+            raise block.error("cannot be inside a step")
         if context in ("model", "step") and not (self.part is None and self.instance is None):
-            raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
+            raise block.error("is supported for the whole assembly only, not inside a part or instance")
         if context == "part" and self.instance is not None:
-            raise block.refuse("is not supported inside an instance: put it into the part or the assembly")
+            raise block.error("is not supported inside an instance: put it into the part or the assembly")
         new_object = properties.read(content, *([] if context in ("deck", "property", "model") else [owner]), block)
         if properties.opens:
             setattr(self, properties.opens, new_object)
@@ -273,8 +274,8 @@ def read_content(blocks: Iterable[Block]) -> Content:
     for block in blocks:
         reader.read_block(with_standard_blanks(block))
     if reader.step is not None:
-        raise reader.step.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
+        raise reader.step.error("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:
-        raise reader.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+        raise reader.coupling.error("*KINEMATIC or *DISTRIBUTING must follow")
     fields.check_steps(reader.content)
     return reader.content

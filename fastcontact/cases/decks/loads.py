@@ -22,7 +22,7 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 Adder = Callable[[Model], None]
-# Names of groups of loaded cells by the kind of the load; the groups of all others are named "load".
+# Names of groups of loaded facets and solids by the kind of the load; groups of other loads are named "load".
 GROUP_NAMES = {"P": "pressure", "S": "heat flux", "BF": "heat source"}
 
 
@@ -37,9 +37,9 @@ def point_group(model: Model, deck_mesh: DeckMesh, kind: str, points: Iterable[i
 def add_forces(model: Model, deck_mesh: DeckMesh, conditions: Conditions, thickness: float) -> None:
     """Add the nodal forces; those along local axes are resolved into their global components."""
     by_shape = ByShape[int]()
-    for table, names in conditions.forces.distinct():
+    for table, components in conditions.forces.distinct():
         by_cosine: dict[tuple[int, float], list[int]] = {}
-        for point, axis, local in names:
+        for point, axis, local in components:
             direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
             for k in np.flatnonzero(np.abs(direction[: deck_mesh.dim]) > 1e-12).tolist():
                 by_cosine.setdefault((k, float(direction[k])), []).append(point)
@@ -97,23 +97,23 @@ def _density(deck_mesh: DeckMesh, element: Element, load: Target) -> float:
         return 1.0
     material = deck_mesh.content.materials[key_of(element.assigned_section.material)]
     if material.density is None:
-        raise load.location.refuse(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
+        raise load.location.error(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
     return material.density
 
 
 def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
     """Return the components of a body force for a load multiplier of 1, times the factor `value` of the cells."""
 
-    def times(component: Any) -> Any:
+    def scaled(component: Any) -> Any:
         if not callable(value):
             return component
         return lambda points: value(points) * (component(points) if callable(component) else component)
 
     if kind[0] == "B":
-        return {kind[1].lower(): times(1.0)}
+        return {kind[1].lower(): scaled(1.0)}
     if kind == "GRAV":
         direction = np.array(vector) / np.linalg.norm(vector)
-        return {"xyz"[k]: times(float(direction[k])) for k in range(dim) if direction[k]}
+        return {"xyz"[k]: scaled(float(direction[k])) for k in range(dim) if direction[k]}
     origin, axis = np.array(vector[:3]), np.array(vector[3:])
     axis = axis / np.linalg.norm(axis)
 
@@ -121,7 +121,7 @@ def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> d
         relative = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))) - origin
         return np.asarray((relative - np.outer(relative @ axis, axis))[:, k])
 
-    return {"xyz"[k]: times(partial(outward, k)) for k in range(dim) if abs(axis[k]) < 1.0}
+    return {"xyz"[k]: scaled(partial(outward, k)) for k in range(dim) if abs(axis[k]) < 1.0}
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
@@ -179,10 +179,10 @@ def heat_loads(deck_mesh: DeckMesh, conditions: Conditions, thickness: float) ->
     for (table, coefficient, (begins, ends)), faces in faces_by_film.items():
         group = deck_mesh.add_facets(f"film {len(adders)}", filter(None, faces))
         rise = _relative(table, reference)
-        size = max((value for _, value in rise), key=abs)
-        ramp = tuple((time, value / size) for time, value in rise) if size else None
+        peak = max((value for _, value in rise), key=abs)
+        ramp = tuple((time, value / peak) for time, value in rise) if peak else None
         add = partial(Model.add_film, begins=begins, ends=ends)
-        adders.append(partial(add, group=group, coefficient=coefficient, ambient=reference + size, ramp=ramp))
+        adders.append(partial(add, group=group, coefficient=coefficient, ambient=reference + peak, ramp=ramp))
     return adders
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.blocks import Block, as_number, refusing, register
+from fastcontact.cases.decks.blocks import Block, as_number, errors_at, register
 from fastcontact.cases.decks.content import Content, Material
 from fastcontact.elasticity import nonlinear_materials as nonlinear
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
@@ -38,15 +38,15 @@ def elastic(content: Content, current: Material, block: Block) -> None:
     kinds = [name for name in CONSTANTS if len(kind) >= 3 and name.startswith(kind)]
     if not kinds:
         names = ", ".join(CONSTANTS)
-        raise block.refuse(f"{current.about}TYPE={kind[:40]} is not supported; expected one of {names}")
+        raise block.error(f"{current.prefix}TYPE={kind[:40]} is not supported; expected one of {names}")
     if kinds[0] != "ISOTROPIC":
         _anisotropic(current, block, kinds[0])
         return
-    row = block.only("temperatures" if len(block.rows) > 1 else "")
+    row = block.only_row("temperatures" if len(block.rows) > 1 else "")
     E, nu = row.number(0), row.number(1, 0.0)
     if row.text(2):
         content.note(row, "the temperature of the constants has no effect: there is one set of them")
-    with refusing(row, current.about):
+    with errors_at(row, current.prefix):
         law = LinearElastic(E=E, nu=nu)
     current.law = lambda axes: law
 
@@ -55,7 +55,7 @@ def _anisotropic(current: Material, block: Block, kind: str) -> None:
     """Read the constants of an anisotropic material, which may fill several lines and be followed by a temperature."""
     numbers, count = block.numbers(), CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
-        raise block.refuse(f"{current.about}{len(numbers)} constants where {kind} has {count}, at one temperature")
+        raise block.error(f"{current.prefix}{len(numbers)} constants where {kind} has {count}, at one temperature")
     values = numbers[:count]
 
     def law(axes: Any) -> Orthotropic | Anisotropic:
@@ -63,7 +63,7 @@ def _anisotropic(current: Material, block: Block, kind: str) -> None:
             return Orthotropic(E=values[:3], nu=values[3:6], G=values[6:], axes=axes)
         return Anisotropic(_moduli(values), axes=axes)
 
-    with refusing(block, current.about):
+    with errors_at(block, current.prefix):
         law(None)
     current.law = law
 
@@ -86,9 +86,9 @@ def _moduli(values: list[float]) -> Array:
 
 def density(content: Content, current: Material, block: Block) -> None:
     """Read *DENSITY: the mass per volume."""
-    current.density = block.only().number(0)
+    current.density = block.only_row().number(0)
     if not current.density > 0:
-        raise block.refuse(f"{current.about}the density {current.density:g} must be positive")
+        raise block.error(f"{current.prefix}the density {current.density:g} must be positive")
 
 
 def plastic(content: Content, current: Material, block: Block) -> None:
@@ -96,23 +96,23 @@ def plastic(content: Content, current: Material, block: Block) -> None:
     hardening = block.choice("HARDENING", ("ISOTROPIC", "KINEMATIC"))
     elastic = None if current.law is None else current.law(None)
     if type(elastic) is not LinearElastic:
-        raise block.refuse(f"{current.about}isotropic *ELASTIC constants must precede it")
+        raise block.error(f"{current.prefix}isotropic *ELASTIC constants must precede it")
     table = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
     if not table:
-        raise block.refuse("a data line with a yield stress is needed")
+        raise block.error("a data line with a yield stress is needed")
     if table[0][0] != 0.0:
-        raise block.rows[0].refuse(f"{current.about}the first plastic strain {table[0][0]:g} must be zero")
+        raise block.rows[0].error(f"{current.prefix}the first plastic strain {table[0][0]:g} must be zero")
     if len({row.text(2) for row in block.rows}) > 1:
-        raise block.refuse(f"{current.about}only one temperature is supported")
+        raise block.error(f"{current.prefix}only one temperature is supported")
     modulus = 0.0  # of kinematic hardening
     if hardening == "KINEMATIC":
         if len(table) > 2:
-            raise block.refuse(f"{current.about}kinematic hardening is linear: two points, not {len(table)}")
+            raise block.error(f"{current.prefix}kinematic hardening is linear: two points, not {len(table)}")
         modulus = (table[1][1] - table[0][1]) / table[1][0] if len(table) == 2 else 0.0
         table = table[:1]
-    with refusing(block, current.about):
-        E, nu, limit = elastic.E, elastic.nu, table[0][1]
-        law = nonlinear.ElasticPlastic(E=E, nu=nu, yield_stress=limit, hardening=table, kinematic=modulus)
+    with errors_at(block, current.prefix):
+        E, nu, yield_stress = elastic.E, elastic.nu, table[0][1]
+        law = nonlinear.ElasticPlastic(E=E, nu=nu, yield_stress=yield_stress, hardening=table, kinematic=modulus)
     current.law = lambda axes: law
 
 
@@ -120,29 +120,29 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     """Read *HYPERELASTIC: the deviatoric constants, then the compressibility constants."""
     kinds = [kind for kind in HYPERELASTIC if kind in block.parameters]
     if len(kinds) != 1:
-        raise block.refuse(f"{current.about}one of {', '.join(HYPERELASTIC)} is supported")
+        raise block.error(f"{current.prefix}one of {', '.join(HYPERELASTIC)} is supported")
     kind = kinds[0]
     terms = as_number(block.location, block.get("N", "1")) if kind == "OGDEN" else 1.0
     if not terms.is_integer() or terms < 1.0:
-        raise block.refuse(f"{current.about}the number of terms N = {terms:g} must be a positive whole number")
+        raise block.error(f"{current.prefix}the number of terms N = {terms:g} must be a positive whole number")
     numbers, (n_deviatoric, n_volumetric) = block.numbers(), (count * int(terms) for count in HYPERELASTIC[kind])
     if len(numbers) < n_deviatoric:
-        raise block.refuse(f"{current.about}{kind} has {n_deviatoric} constants, {len(numbers)} are given")
+        raise block.error(f"{current.prefix}{kind} has {n_deviatoric} constants, {len(numbers)} are given")
     constants, (D1, *others) = numbers[:n_deviatoric], [*numbers[n_deviatoric:], 0.0][:n_volumetric]
     if any(others):
-        raise block.refuse(f"{current.about}only the compressibility constant D1 is supported")
+        raise block.error(f"{current.prefix}only the compressibility constant D1 is supported")
     mu = sum(constants[::2]) if kind == "OGDEN" else 2.0 * sum(constants[: 2 if kind == "MOONEY-RIVLIN" else 1])
     nu = DEFAULT_POISSON_RATIO
     bulk = 2.0 / D1 if D1 else 2.0 * mu * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu))
     if not D1:
         content.note(block, f"D1 = 0: the bulk modulus is that of nu = {nu}")
-    with refusing(block, current.about):
+    with errors_at(block, current.prefix):
         law = _hyperelastic(kind, constants, mu, bulk)
     current.law = lambda axes: law
 
 
 def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
-    """Return a hyperelastic material from its constants, its shear modulus and its bulk modulus [pressure]."""
+    """Return a hyperelastic material from its deviatoric constants, and its shear and bulk moduli at small strains."""
     if kind == "NEO HOOKE":
         E, nu = 9.0 * bulk * mu / (3.0 * bulk + mu), (3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu))
         return nonlinear.NeoHookean(E, nu)
@@ -159,21 +159,21 @@ def conductivity(content: Content, current: Material, block: Block) -> None:
 
 def expansion(content: Content, current: Material, block: Block) -> None:
     """Read *EXPANSION: coefficients of thermal expansion at one temperature."""
-    current.expansion = along_axes(current, block)
+    current.expansion = coefficients_of(current, block)
     if "ZERO" in block.parameters:
         content.note(block, "ZERO has no effect: strains refer to the initial temperatures, coefficients are constant")
 
 
-def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
+def coefficients_of(current: Material, block: Block) -> float | tuple[float, ...]:
     """Return the coefficient of a block, or its coefficients along the axes.
 
     Raises CaseError if they depend on the temperature.
     """
     kind = block.choice("TYPE", tuple(COEFFICIENTS))
-    row, count = block.only("temperatures"), COEFFICIENTS[kind]
+    row, count = block.only_row("temperatures"), COEFFICIENTS[kind]
     values = tuple(row.number(index) for index in range(count))
     if any(row.entries[count + 1 :]):
-        raise row.refuse(f"{current.about}TYPE={kind} has {count} coefficients, at one temperature")
+        raise row.error(f"{current.prefix}TYPE={kind} has {count} coefficients, at one temperature")
     return values[0] if kind == "ISO" else values
 
 
@@ -185,7 +185,7 @@ def law_of(content: Content, material: Material, axes: Any, incompatible_modes: 
     law, expansion = material.law(axes), material.expansion
     law = replace(law, density=material.density)
     if isinstance(law, nonlinear.NonlinearElastic) and incompatible_modes:
-        content.note(material, f"{material.about}incompatible modes are left out, since it is nonlinear")
+        content.note(material, f"{material.prefix}incompatible modes are left out, since it is nonlinear")
     elif incompatible_modes:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
@@ -197,7 +197,7 @@ def law_of(content: Content, material: Material, axes: Any, incompatible_modes: 
             content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures cause no strain")
         return replace(law, expansion=0.0) if heated else law
     if not heated:
-        content.note(material, f"{material.about}without temperatures the expansion has no effect")
+        content.note(material, f"{material.prefix}without temperatures the expansion has no effect")
     return _add_constants(material, law, axes, expansion=expansion)
 
 
@@ -209,14 +209,14 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
     block = material.conductivity
     if block is None:
         if content.heat:
-            raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
+            raise material.error(f"material '{material.name}' has no *CONDUCTIVITY")
         return None
     if not content.heat:
-        content.note(block, f"{material.about}*CONDUCTIVITY has no effect, because temperatures are prescribed")
+        content.note(block, f"{material.prefix}*CONDUCTIVITY has no effect, because temperatures are prescribed")
         return None
-    values = along_axes(material, block)
+    values = coefficients_of(material, block)
     if not np.min(values) > 0.0:
-        raise block.refuse(f"{material.about}the conductivity {np.min(values):g} must be positive")
+        raise block.error(f"{material.prefix}the conductivity {np.min(values):g} must be positive")
     return values
 
 
@@ -224,8 +224,8 @@ def _add_constants(material: Material, law: Any, axes: Any, **constants: Any) ->
     """Return a material with additional constants; an elastic one becomes orthotropic for constants along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, nonlinear.NonlinearElastic):
-            raise material.refuse(
-                f"{material.about}expansion and conductivity along axes are supported in linear elastic materials only"
+            raise material.error(
+                f"{material.prefix}expansion and conductivity along axes are supported in linear elastic materials only"
             )
         G = law.E / (2.0 * (1.0 + law.nu))
         others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}

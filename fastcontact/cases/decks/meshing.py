@@ -16,7 +16,7 @@ from fastcontact.mesh import elements, topology
 from fastcontact.mesh.mesh import Mesh, starts_of
 
 # Largest difference in z between the points of a plane model, relative to its size.
-FLAT = 1e-9
+PLANE_TOLERANCE = 1e-9
 
 
 @dataclass
@@ -135,22 +135,20 @@ def deck_mesh_of(content: Content) -> DeckMesh:
     deck_mesh = DeckMesh(content)
     assemble(deck_mesh)
     if not deck_mesh.solids:
-        raise content.steps[0].refuse("the deck has no solid elements")
+        raise content.steps[0].error("the deck has no solid elements")
     first = deck_mesh.solids[0].solid
     for element in deck_mesh.solids:
         if element.solid.kinematics != first.kinematics:
-            raise element.cell.refuse(
+            raise element.cell.error(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
-        if element.solid.conducts and content.heat != "uncoupled":
-            raise element.cell.refuse(
+        if element.solid.heat_only and content.heat != "uncoupled":
+            raise element.cell.error(
                 f"elements of type {element.solid.name} conduct heat alone: they need *HEAT TRANSFER in all steps"
             )
     points = deck_mesh.points
-    if deck_mesh.dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
-        raise deck_mesh.solids[0].cell.refuse(
-            f"elements of type {first.name} lie in the plane z = const, but z differs"
-        )
+    if deck_mesh.dim == 2 and np.ptp(points[:, 2]) > PLANE_TOLERANCE * np.ptp(points[:, :2]):
+        raise deck_mesh.solids[0].cell.error(f"elements of type {first.name} lie in the plane z = const, but z differs")
     _add_groups(deck_mesh)
     return deck_mesh
 
@@ -164,9 +162,9 @@ def _add_groups(deck_mesh: DeckMesh) -> None:
             points = deck_mesh.members_of("node", scope, name, members[0].location) if members else []
             deck_mesh.point_groups[prefix + part.set_names[name]] = ascending(points)
         for name, definition in part.surfaces.items():
-            if definition.of_nodes and definition.faces:
+            if definition.of_nodes and definition.entries:
                 _add_node_based_surface(deck_mesh, prefix + definition.name, definition, scope)
-            elif definition.faces:  # an unused surface may be empty
+            elif definition.entries:  # an unused surface may be empty
                 faces = deck_mesh.faces(f"{scope}.{name}" if scope else name, definition.location)
                 deck_mesh.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
@@ -191,7 +189,7 @@ def check_nodes(deck_mesh: DeckMesh, name: str, location: Location) -> None:
     definition, scope = deck_mesh.surface(name, location)
     for point in deck_mesh.surface_nodes(definition, scope) if definition.of_nodes else ():
         if point not in deck_mesh.outer_faces:
-            raise definition.refuse(
+            raise definition.error(
                 f"node {deck_mesh.label_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
             )

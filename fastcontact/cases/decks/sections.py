@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.cases.decks.assembled import Assembly, facet_points
-from fastcontact.cases.decks.blocks import Block, key_of, refusing
+from fastcontact.cases.decks.blocks import Block, errors_at, key_of
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.content import Content, PretensionSection, SectorEnds
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
@@ -21,11 +21,11 @@ from fastcontact.model.model import Model
 def pretension_section(content: Content, block: Block) -> None:
     """Read *PRE-TENSION SECTION: a surface across a bolt, and the node with the shortening and the force of the bolt."""
     if len(block.rows) > 1:
-        raise block.refuse(f"{len(block.rows)} data lines, but at most one is allowed, the normal")
+        raise block.error(f"{len(block.rows)} data lines, but at most one is allowed, the normal")
     row = block.rows[0] if block.rows else None
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):
-        raise block.refuse("the normal is zero")
+        raise block.error("the normal is zero")
     names = block.required("SURFACE"), block.required("NODE")
     content.pretension_sections.append(PretensionSection(block.location, *names, normal))
 
@@ -39,10 +39,10 @@ def sections_by_point(assembly: Assembly) -> dict[int, PretensionSection]:
     for section in assembly.content.pretension_sections:
         point = assembly.node(section.node, section.location)
         if point in assembly.solid_points:
-            raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
+            raise section.error(f"node {section.node} belongs to an element: a section needs a separate node")
         if point in sections:
             line = sections[point].location.line
-            raise section.refuse(f"node {section.node} has a section already, in line {line}")
+            raise section.error(f"node {section.node} has a section already, in line {line}")
         sections[point] = section
     return sections
 
@@ -50,11 +50,11 @@ def sections_by_point(assembly: Assembly) -> dict[int, PretensionSection]:
 def _locked_from(point: int, section: PretensionSection, conditions: Conditions) -> float | None:
     """Return the load factor from which FIXED locks a section, or None. Raises CaseError if a later step releases it."""
     track = conditions.supports.tracks.get((point, 0, False))
-    for period in (period for period in track.periods if period.keeps) if track else ():
+    for period in (period for period in track.periods if period.fixed) if track else ():
         if period.ends < np.inf:
             step = conditions.assembly.content.steps[int(period.ends)]
             supports = [block for block in step.conditions if block.keyword == "BOUNDARY"]
-            raise max(supports, key=lambda block: block.removes_earlier).refuse(
+            raise max(supports, key=lambda block: block.removes_earlier).error(
                 f"node {section.node} of a pretension section is released here: a locked section stays locked"
             )
         return period.begins
@@ -71,10 +71,10 @@ def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
         deck_mesh.faces(section.surface, section.location)
         group = group_of_surface(deck_mesh, section.surface)
         if group in sections:
-            raise section.refuse(f"surface '{group}' has a pretension section already")
+            raise section.error(f"surface '{group}' has a pretension section already")
         sections.add(group)
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
-        with refusing(section):
+        with errors_at(section):
             mesh = cut(mesh, group, normal)
     return mesh
 
@@ -123,26 +123,26 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> None:
     for block in deck_mesh.content.sectors:
         text = block.required("N")
         if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
-            raise block.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
-        row = block.only()
+            raise block.error(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
+        row = block.only_row()
         first, second = np.reshape([row.number(i) for i in range(6)], (2, 3))
         if (first == second).all():
-            raise block.refuse("the two points of the axis are the same")
+            raise block.error("the two points of the axis are the same")
         direction = (second - first) / np.linalg.norm(second - first)
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
-            raise block.refuse("the axis of a plane model is along z: give two points that differ in z only")
+            raise block.error("the axis of a plane model is along z: give two points that differ in z only")
         ends = _ends(deck_mesh.content, block)
-        unused = [others for others in unused if others is not ends]
+        unused = [candidate for candidate in unused if candidate is not ends]
         for name in ends.surfaces:
             deck_mesh.faces(name, ends.location)
-        groups = [group_of_surface(deck_mesh, name) for name in ends.surfaces]
-        with refusing(block):
+        first_end, second_end = (group_of_surface(deck_mesh, name) for name in ends.surfaces)
+        with errors_at(block):
             model.add_cyclic_symmetry(
-                groups[0], groups[1], sectors=int(text), origin=tuple(first[: model.mesh.dim].tolist()),
+                first_end, second_end, sectors=int(text), origin=tuple(first[: model.mesh.dim].tolist()),
                 direction=tuple(direction.tolist()),
             )  # fmt: skip
     for ends in unused:
-        raise ends.refuse("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
+        raise ends.error("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
 
 
 def _ends(content: Content, block: Block) -> SectorEnds:
@@ -152,5 +152,5 @@ def _ends(content: Content, block: Block) -> SectorEnds:
     if len(matching) != 1:
         names = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
         parameter = f"TIE={tie[:80]}" if tie else "TIE is not given"
-        raise block.refuse(f"{parameter}, and the ties with CYCLIC SYMMETRY are: {names}")
+        raise block.error(f"{parameter}, and the ties with CYCLIC SYMMETRY are: {names}")
     return matching[0]

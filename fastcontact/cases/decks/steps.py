@@ -14,10 +14,10 @@ MOST_INCREMENTS = 20
 def new_step(content: Content, step: Step | None, block: Block) -> Step:
     """Read *STEP and return the new step."""
     if step is not None:
-        raise block.refuse("the previous step has no *END STEP")
+        raise block.error("the previous step has no *END STEP")
     nonlinear = "NLGEOM" in block.parameters and block.get("NLGEOM", "YES").upper() != "NO"
     if content.modes is not None:
-        raise block.refuse("follows a step with *FREQUENCY, which must be the last step")
+        raise block.error("follows a step with *FREQUENCY, which must be the last step")
     block.choice("AMPLITUDE", ("RAMP",))
     content.steps.append(Step(block.location, nonlinear, perturbation="PERTURBATION" in block.parameters))
     return content.steps[-1]
@@ -26,11 +26,11 @@ def new_step(content: Content, step: Step | None, block: Block) -> Step:
 def static(content: Content, step: Step, block: Block) -> None:
     """Read *STATIC: the duration of the step divided by its initial increment is the number of increments."""
     if step.has_procedure:
-        raise block.refuse("the step has this keyword twice")
+        raise block.error("the step has this keyword twice")
     if step.n_modes:
-        raise block.refuse("a step has either *STATIC or one *FREQUENCY")
+        raise block.error("a step has either *STATIC or one *FREQUENCY")
     if step.perturbation:
-        raise step.refuse("PERTURBATION is not supported with *STATIC, only with *FREQUENCY")
+        raise step.error("PERTURBATION is not supported with *STATIC, only with *FREQUENCY")
     step.has_procedure = True
     if "STABILIZE" in block.parameters:
         content.note(block, "STABILIZE has no effect: bodies that are held by contact alone need no damping")
@@ -40,13 +40,13 @@ def static(content: Content, step: Step, block: Block) -> None:
         for index in (2, 3):
             row.number(index, 1.0)
         if not (step.period > 0 and step.increment > 0):
-            raise row.refuse("the increment and the length of the step must be positive")
+            raise row.error("the increment and the length of the step must be positive")
 
 
 def heat_procedure(content: Content, step: Step, block: Block) -> None:
     """Read *HEAT TRANSFER, *COUPLED or *UNCOUPLED TEMPERATURE-DISPLACEMENT: *STATIC with steady heat conduction."""
     if "STEADY STATE" not in block.parameters:
-        raise block.refuse("only STEADY STATE is supported, not transient heat conduction")
+        raise block.error("only STEADY STATE is supported, not transient heat conduction")
     static(content, step, block)
     step.heat = "uncoupled" if block.keyword == "HEAT TRANSFER" else "coupled"
     if block.keyword[:2] == "UN":
@@ -56,30 +56,30 @@ def heat_procedure(content: Content, step: Step, block: Block) -> None:
 def frequency(content: Content, step: Step, block: Block) -> None:
     """Read *FREQUENCY: the number of modes, which is 10 by default."""
     if step.has_procedure or step.n_modes:
-        raise block.refuse("a step has either *STATIC or one *FREQUENCY")
+        raise block.error("a step has either *STATIC or one *FREQUENCY")
     number = block.rows[0].integer(0, 10) if block.rows else 10
     if number < 1:
-        raise block.rows[0].refuse("the number of modes must be at least 1")
+        raise block.rows[0].error("the number of modes must be at least 1")
     step.n_modes = number
 
 
 def end_step(content: Content, step: Step | None, block: Block) -> None:
     """Read *END STEP; a step with *FREQUENCY is removed from the load steps and stored as a request for modes."""
     if step is None:
-        raise block.refuse("there is no step to end")
+        raise block.error("there is no step to end")
     if not step.n_modes:
         if not step.has_procedure:
-            raise step.refuse("the step has no *STATIC or other procedure")
+            raise step.error("the step has no *STATIC or other procedure")
         return
     if step.conditions:
-        raise step.conditions[0].refuse(
+        raise step.conditions[0].error(
             "cannot be in a step with *FREQUENCY: the modes use the supports of the preceding steps"
         )
     content.steps.pop()
     if not content.steps:
-        raise step.refuse("*FREQUENCY needs a step with *STATIC before it: modes are vibrations about its last state")
+        raise step.error("*FREQUENCY needs a step with *STATIC before it: modes are vibrations about its last state")
     if content.steps[-1].heat == "uncoupled":
-        raise step.refuse("*FREQUENCY after *HEAT TRANSFER is not supported: displacements are fixed there")
+        raise step.error("*FREQUENCY after *HEAT TRANSFER is not supported: displacements are fixed there")
     stiffening = step.perturbation or any(earlier.nonlinear for earlier in content.steps)
     content.modes = {"n": step.n_modes, "stress_stiffening": stiffening}
     content.note(
@@ -99,7 +99,7 @@ def condition(content: Content, step: Step | None, block: Block) -> None:
     elif block.keyword == "BOUNDARY":
         content.supports.append(block)
     else:
-        raise block.refuse("loads belong in a step")
+        raise block.error("loads belong in a step")
 
 
 def amplitude(content: Content, block: Block) -> None:
@@ -111,5 +111,5 @@ def amplitude(content: Content, block: Block) -> None:
     numbers = block.numbers()
     times, values = numbers[::2], numbers[1::2]
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
-        raise block.refuse(f"amplitude '{name}' needs pairs of time and multiplier, with ascending times")
+        raise block.error(f"amplitude '{name}' needs pairs of time and multiplier, with ascending times")
     content.amplitudes[key_of(name)] = Amplitude(block.location, name, tuple(times), tuple(values), total_time)

@@ -16,7 +16,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.pairing import FACING
-from fastcontact.contact.projection import closest_of_kinds
+from fastcontact.contact.projection import closest_of_types
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import polynomial_degree, tables
 from fastcontact.contact.surface import FacetBlock, Surface
@@ -24,8 +24,8 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
-# Two facets are clipped if their distance is at most REACH times the sum of the radius of the secondary facet and its
-# distance from the closest primary facet.
+# Two facets are clipped if their distance along the normal is at most REACH times the sum of the radius of the secondary
+# facet and its distance from the closest primary facet.
 REACH = 3.0
 # Work per secondary facet in the units of `parallel.portions`, which choose the number of threads.
 EFFORT = 400
@@ -54,30 +54,30 @@ def face_overlap(
     secondary_polygons = [_Polygons.of(block, deformed) for block in secondary.blocks]
     primary_polygons = [_Polygons.of(block, deformed) for block in primary.blocks]
     centres = np.concatenate([polygons.origin for polygons in secondary_polygons])
-    distance = closest_of_kinds(centres, primary.node_positions(deformed)).distance
+    distance = closest_of_types(centres, primary.node_positions(deformed)).distance
     axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
-    masses, couplings, depths, offset = [], [], [], 0
-    for of_secondary in secondary_polygons:
-        size, nodes = of_secondary.block.facets.shape
-        reach = REACH * (distance[offset : offset + size] + of_secondary.radius)
-        mass, depth, primary_offset = np.zeros((size, nodes, nodes)), np.zeros((size, nodes)), 0
-        for of_primary in primary_polygons:
-            pairs = _overlap_candidates(of_secondary, of_primary, reach)
-            rows = slice(offset, offset + size), slice(primary_offset, primary_offset + len(of_primary.nodes))
-            heights = _heights(smoothing, pairs, rows, axes)
-            coupling, area, depth_of_pairs = _integrals(of_secondary, of_primary, pairs, reference, heights)
+    masses, couplings, gap_reductions, offset = [], [], [], 0
+    for polygons in secondary_polygons:
+        n, k = polygons.block.facets.shape
+        reach = REACH * (distance[offset : offset + n] + polygons.radius)
+        mass, reduction, primary_offset = np.zeros((n, k, k)), np.zeros((n, k)), 0
+        for opposite in primary_polygons:
+            pairs = _overlapping_pairs(polygons, opposite, reach)
+            facets = slice(offset, offset + n), slice(primary_offset, primary_offset + len(opposite.nodes))
+            heights = _heights(smoothing, pairs, facets, axes)
+            coupling, mass_of_block, reduction_of_block = _integrals(polygons, opposite, pairs, reference, heights)
             couplings.append(coupling)
-            mass += area
-            depth += depth_of_pairs
-            primary_offset += len(of_primary.nodes)
+            mass += mass_of_block
+            reduction += reduction_of_block
+            primary_offset += len(opposite.nodes)
         masses.append(mass)
-        depths.append(depth[:, :, None] * -of_secondary.axes[:, None, 2])
-        offset += size
-    return Overlap(masses, couplings, depths, [])
+        gap_reductions.append(reduction[:, :, None] * -polygons.axes[:, None, 2])
+        offset += n
+    return Overlap(masses, couplings, gap_reductions, [])
 
 
 def _heights(
-    smoothing: Smoothing | None, pairs: Indices, rows: tuple[slice, slice], axes: list[Array] | None
+    smoothing: Smoothing | None, pairs: Indices, facets: tuple[slice, slice], axes: list[Array] | None
 ) -> tuple[Array, Array, Array]:
     """Return the heights of the smooth surfaces above the facets of two blocks, and factors for each pair of facets.
 
@@ -87,7 +87,7 @@ def _heights(
         The smooth surfaces; if None, the heights are empty arrays.
     pairs : ndarray of int (n_pairs, 2)
         Numbers of the secondary and the primary facet, each in its block.
-    rows : (slice, slice)
+    facets : (slice, slice)
         Ranges of the facets of the two blocks among all facets of their sides.
     axes : list of ndarray or None
         `surface_smoothing.frames` of all facets of both sides.
@@ -97,13 +97,13 @@ def _heights(
     secondary, primary : ndarray
         Coefficients of the heights, see `surface_smoothing`.
     factors : ndarray (n_pairs, 2)
-        See `Smoothing.shared`.
+        See `Smoothing.height_factors`.
     """
     if smoothing is None or axes is None:
         no_heights = np.zeros((0, 0, 0))
         return no_heights, no_heights, np.zeros((len(pairs), 2))
-    secondary, primary = rows
-    factors = smoothing.shared(pairs[:, 0] + secondary.start, pairs[:, 1] + primary.start, axes)
+    secondary, primary = facets
+    factors = smoothing.height_factors(pairs[:, 0] + secondary.start, pairs[:, 1] + primary.start, axes)
     return smoothing.secondary.heights[secondary], smoothing.primary.heights[primary], factors
 
 
@@ -116,17 +116,18 @@ class _Polygons:
     block : FacetBlock
     nodes : ndarray (n, k, 3)
         Positions of the k nodes of each of n facets [length].
-    count : int
+    n_corners : int
         Number of corners of a facet.
     origin, axes : ndarray (n, 3), ndarray (n, 3, 3)
-        Centres of the facets [length], and unit vectors (in rows): two in the plane of the corners, and its normal.
+        Centres of the facets [length], and unit vectors in rows: two tangents of the plane of the corners, and its normal
+        [-].
     radius : ndarray (n,)
         Largest distance of a corner from the centre [length].
     """
 
     block: FacetBlock
     nodes: Array
-    count: int
+    n_corners: int
     origin: Array
     axes: Array
     radius: Array
@@ -134,27 +135,27 @@ class _Polygons:
     @classmethod
     def of(cls, block: FacetBlock, deformed: Array) -> _Polygons:
         """Return the facets of a block for nodal coordinates `deformed` (n_points, 3) [length]."""
-        nodes, count = deformed[block.facets], elements.get(block.element).n_corners
+        nodes, n_corners = deformed[block.facets], elements.get(block.element).n_corners
         origin, axes = np.empty((len(nodes), 3)), np.empty((len(nodes), 3, 3))
-        _cut_faces_kernels.planes(nodes, count, origin, axes)
-        radius = np.linalg.norm(nodes[:, :count] - origin[:, None], axis=2).max(axis=1)
-        return cls(block, nodes, count, origin, axes, radius)
+        _cut_faces_kernels.planes(nodes, n_corners, origin, axes)
+        radius = np.linalg.norm(nodes[:, :n_corners] - origin[:, None], axis=2).max(axis=1)
+        return cls(block, nodes, n_corners, origin, axes, radius)
 
 
-def _overlap_candidates(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
-    """Return pairs (n, 2) of a secondary and a primary facet that may overlap, in ascending order.
+def _overlapping_pairs(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
+    """Return the pairs (n, 2) of a secondary and a primary facet whose projections overlap, in ascending order.
 
     `reach` (n_secondary,) are the largest distances at which facets are paired [length].
     """
     numbers = tree_order(primary.origin, 1)
-    corners = primary.nodes[numbers, : primary.count]
+    corners = primary.nodes[numbers, : primary.n_corners]
     tree = build(corners.min(axis=1), corners.max(axis=1))
     capacity = 8 * (len(secondary.nodes) + len(primary.nodes))
     while True:
         pairs = np.empty((capacity, 2), np.intp)
         count = _cut_faces_kernels.facing_pairs(
-            secondary.nodes, secondary.count, secondary.origin, secondary.axes, secondary.radius, reach,
-            primary.nodes, primary.count, np.ascontiguousarray(primary.axes[:, 2]), numbers, tree, -FACING, pairs,
+            secondary.nodes, secondary.n_corners, secondary.origin, secondary.axes, secondary.radius, reach,
+            primary.nodes, primary.n_corners, np.ascontiguousarray(primary.axes[:, 2]), numbers, tree, -FACING, pairs,
         )  # fmt: skip
         if count <= capacity:
             return pairs[np.lexsort((pairs[:count, 1], pairs[:count, 0]))]
@@ -182,7 +183,8 @@ def _integrals(
     mass : ndarray (n, k, k)
         Integrals of products of two shape functions of the n secondary facets [area].
     gap_reduction : ndarray (n, k)
-        Integrals of the shape functions times the distance by which the smooth surfaces are closer than the facets [volume].
+        Integrals of the shape functions times the distances by which the smooth surfaces are closer to each other than the
+        facets [volume].
 
     Raises
     ------
@@ -190,7 +192,7 @@ def _integrals(
         If a facet is too distorted to be projected.
     """
     element, opposite = elements.get(secondary.block.element), elements.get(primary.block.element)
-    to_terms, primary_to_terms = tables(element.n_nodes).to_terms, tables(opposite.n_nodes).to_terms
+    to_terms, opposite_to_terms = tables(element.n_nodes).to_terms, tables(opposite.n_nodes).to_terms
     n, k = secondary.block.facets.shape
     mass, integrals = np.empty((len(pairs), k, k)), np.empty((len(pairs), k, opposite.n_nodes))
     gap_reduction, start = np.empty((n, k)), np.searchsorted(pairs[:, 0], np.arange(n + 1))
@@ -199,9 +201,9 @@ def _integrals(
     if element.n_nodes == opposite.n_nodes == 3:
         degree = max(degree, heights[0].shape[1])
     arguments = (
-        start, secondary.nodes, secondary.count, secondary.origin, secondary.axes,
-        to_terms @ secondary.nodes, to_terms @ reference[secondary.block.facets], to_terms, _middle(element),
-        primary.nodes, primary.count, primary_to_terms @ primary.nodes, primary_to_terms, _middle(opposite),
+        start, secondary.nodes, secondary.n_corners, secondary.origin, secondary.axes,
+        to_terms @ secondary.nodes, to_terms @ reference[secondary.block.facets], to_terms, _centre(element),
+        primary.nodes, primary.n_corners, opposite_to_terms @ primary.nodes, opposite_to_terms, _centre(opposite),
         pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, gap_reduction,
     )  # fmt: skip
     failed = parallel.parallel_map(
@@ -210,11 +212,11 @@ def _integrals(
     if max(failed) >= 0:
         first, second = (side.origin[row] for side, row in zip((secondary, primary), pairs[max(failed)], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
-    of_facets = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
-    total = (of_facets @ mass.reshape(-1, k * k)).reshape(-1, k, k)
-    return Coupling(secondary.block, primary.block, pairs, integrals), total, gap_reduction
+    sum_over_pairs = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
+    mass_of_facets = (sum_over_pairs @ mass.reshape(-1, k * k)).reshape(-1, k, k)
+    return Coupling(secondary.block, primary.block, pairs, integrals), mass_of_facets, gap_reduction
 
 
-def _middle(element: elements.Element) -> Array:
+def _centre(element: elements.Element) -> Array:
     """Return the reference coordinates (2,) of the centre of a facet."""
     return np.ascontiguousarray(element.nodes[: element.n_corners].mean(axis=0))

@@ -15,7 +15,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 @interpretable_kernel
 def planes(corners, n_corners, origin, axes):
-    """Fill `origin` (n, 3) with the centres of polygons (n, k, 3) and `axes` (n, 3, 3) with their axes."""
+    """Fill `origin` (n, 3) with the centres of polygons (n, k, 3), and `axes` (n, 3, 3) with two tangents and the normal."""
     for i in range(corners.shape[0]):
         _plane(corners[i], n_corners, origin[i], axes[i])
 
@@ -64,6 +64,7 @@ def _flatten(points, count, shifted, origin, axes, flat):
 
 @kernel
 def _area(flat, count):
+    """Return the signed area of a polygon, positive if its corners are in counter-clockwise order."""
     area = 0.0
     for k in range(count):
         m = (k + 1) % count
@@ -87,10 +88,10 @@ def _centroid(flat, count):
 
 @kernel
 def _clip(subject, count, window, n_window, spare, least):
-    """Clip `subject` in place by a convex, counter-clockwise `window`; return its number of corners.
+    """Clip `subject` in place by a convex, counter-clockwise `window` (Sutherland and Hodgman); return its number of corners.
 
     Corners lie on a line of the window if their triangle with it has at most the area `least`. Without this tolerance, nearly
-    coincident lines would intersect at places that depend on round-off.
+    coincident lines would intersect at points that depend on round-off.
     """
     for w in range(n_window):
         ax, ay = window[w, 0], window[w, 1]
@@ -133,7 +134,7 @@ def _overlap(corners, count, others, n_others, origin, axes, subject, window, sp
 
 
 @kernel
-def _meets(low, high, origin, normal, radius, reach):
+def _may_intersect(low, high, origin, normal, radius, reach):
     """Return whether a box may intersect the cylinder of `radius` and length 2 `reach` around a normal.
 
     The result is False for an empty box.
@@ -189,7 +190,7 @@ def facing_pairs(
         while top > 0:
             top -= 1
             box = stack[top]
-            if not _meets(tree.low[box], tree.high[box], origin[s], normal, radius[s], reach[s]):
+            if not _may_intersect(tree.low[box], tree.high[box], origin[s], normal, radius[s], reach[s]):
                 continue
             if box < leaves:
                 stack[top], stack[top + 1] = 2 * box, 2 * box + 1
@@ -255,8 +256,8 @@ def _locate(flat, x, y, xi, terms):
 
 
 @innermost_kernel
-def _stretch(facet, terms):
-    """Return the area of a facet per unit of xi at the point of `terms`."""
+def _area_density(facet, terms):
+    """Return the area of a facet per unit of the reference coordinates, at the point at which `terms` are evaluated."""
     area = 0.0
     for d in range(3):
         e, f = (d + 1) % 3, (d + 2) % 3
@@ -273,6 +274,7 @@ def _stretch(facet, terms):
 
 @innermost_kernel
 def _fill_shape(to_terms, terms, shape):
+    """Fill `shape` (n_nodes,) with the shape functions at the point at which `terms` are evaluated."""
     for k in range(shape.shape[0]):
         shape[k] = 0.0
     for j in range(shape.shape[0]):
@@ -389,7 +391,7 @@ def integrate(
                     return i
                 _fill_shape(to_terms, terms, shape)
                 _fill_shape(other_to_terms, other_terms, other_shape)
-                area = weights[q] * twice_area * _stretch(reference[s], terms) / projected_area
+                area = weights[q] * twice_area * _area_density(reference[s], terms) / projected_area
                 _add_products(area, shape, other_shape, mass, coupling, i)
                 if heights.shape[1] > 0:
                     rise = factor[i, 0] * _height(heights[s], xi)

@@ -20,9 +20,9 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Reference coordinate up to which a facet is cut where the primary side ends. Points beyond it face the side within the
-# smallest tolerance of projections.
-INSIDE = 1.0 - 2.0 * SINGLE_PRECISION
+# Largest reference coordinate at which a facet is cut where the primary side ends. If the cut is nearer to the end of the
+# facet, the complete facet faces the primary side within the smallest tolerance of projections.
+LARGEST_CUT = 1.0 - 2.0 * SINGLE_PRECISION
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
@@ -57,7 +57,7 @@ def line_points(
     The primary side is extended by `tolerance` facet lengths at its ends. `borders` are additional cuts, given by their
     facets (n,) and reference coordinates (n,).
     """
-    facet, begin, end = _cuts(block, primary, deformed, tolerance, borders)
+    facet, begin, end = _segments(block, primary, deformed, tolerance, borders)
     s, w = quadrature.gauss_line(n_gauss)
     xi = (0.5 * (begin + end)[:, None] + 0.5 * (end - begin)[:, None] * s[:, 0]).ravel()
     weight = (0.5 * (end - begin)[:, None] * w).ravel()
@@ -71,7 +71,7 @@ def line_points(
     return LinePoints(facet, xi, shape, area)
 
 
-def _cuts(
+def _segments(
     block: FacetBlock, primary: Surface, deformed: Array, tolerance: float, borders: tuple[Indices, Array]
 ) -> tuple[Indices, Array, Array]:
     """Return the facet of each segment of a block, and the reference coordinates of the two ends of the segment."""
@@ -103,26 +103,26 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     interference, the closest point jumps from one facet to the next as the bodies move.
     """
     ends, first = np.unique(primary.ends, return_index=True)
-    foot, normal = deformed[primary.points[ends]], normals[ends]
-    opposite = closest(foot, deformed[block.facets])
+    position, normal = deformed[primary.points[ends]], normals[ends]
+    opposite = closest(position, deformed[block.facets])
     xi_0 = opposite.xi[:, 0]
     has_two_facets = primary.inner_ends.ravel()[first]
     cosine = np.ones(len(primary.points))  # between the normals of facets and of nodes, small at corners
     deviation = np.einsum("fad,fad->fa", normals_at_nodes(primary, deformed), normals[primary.all_local])
     np.minimum.at(cosine, primary.all_local, np.where(primary.node_weights > 0.0, deviation, 1.0))
     smooth = has_two_facets & ~(cosine < np.cos(np.radians(0.5 * CORNER)))[ends]
-    in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < INSIDE) & ~smooth)
-    rows = np.flatnonzero(has_two_facets)
-    facets = np.column_stack([opposite.facet[rows], block.neighbours[opposite.facet[rows]]])
-    distance = _signed_distances(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
+    in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < LARGEST_CUT) & ~smooth)
+    inner = np.flatnonzero(has_two_facets)
+    facets = np.column_stack([opposite.facet[inner], block.neighbours[opposite.facet[inner]]])
+    distance = _signed_distances(deformed[block.facets[facets]], position[inner][:, None], normal[inner][:, None])
     distance[facets < 0] = 1.0
     row, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
     return np.concatenate([opposite.facet[in_facet], facets.ravel()[row]]), np.concatenate([xi_0[in_facet], xi])
 
 
-def _signed_distances(points: Array, foot: Array, normal: Array) -> Array:
-    """Return signed distances of `points` (..., k, 2) from lines through `foot` along `normal` (..., 2) [length]."""
-    offset = points - foot[..., None, :]
+def _signed_distances(points: Array, origin: Array, normal: Array) -> Array:
+    """Return signed distances of `points` (..., k, 2) from lines through `origin` along `normal` (..., 2) [length]."""
+    offset = points - origin[..., None, :]
     return np.asarray(offset[..., 0] * normal[..., None, 1] - offset[..., 1] * normal[..., None, 0])
 
 
@@ -139,16 +139,16 @@ def _opposite_ends(
         for end, s in zip(np.repeat([0, 1], len(ends)), np.outer([-1.0, 1.0], ends).ravel(), strict=True):
             free = np.flatnonzero(~inner_ends[:, end])
             weights = shape(np.array([[s]]))[0]
-            foot = np.einsum("k,fkd->fd", weights, deformed[primary_block.facets[free]])
+            position = np.einsum("k,fkd->fd", weights, deformed[primary_block.facets[free]])
             normal = np.einsum("k,fkd->fd", weights, normals[primary_block.local[free]])
-            distance = _signed_distances(deformed[block.facets][None], foot[:, None], normal[:, None])
+            distance = _signed_distances(deformed[block.facets][None], position[:, None], normal[:, None])
             facet, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
             facets.append(facet % len(block.facets))
             coordinates.append(xi)
         offset += len(primary_block.facets)
     facet, xi = np.concatenate(facets), np.concatenate(coordinates)
-    inside = np.abs(xi) < INSIDE
-    return facet[inside], xi[inside]
+    is_inside = np.abs(xi) < LARGEST_CUT
+    return facet[is_inside], xi[is_inside]
 
 
 def facets_at_ends(block: FacetBlock, primary: Surface, deformed: Array, tolerance: float) -> Indices:
@@ -157,15 +157,19 @@ def facets_at_ends(block: FacetBlock, primary: Surface, deformed: Array, toleran
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:
-    """Return the zeros of fields inside lines of two or three nodes, as rows of the nodal `values` (n, k) and coordinates."""
+    """Return the zeros of fields inside lines of two or three nodes.
+
+    They are given by rows of the nodal `values` (n, k), and reference coordinates.
+    """
     a, b = values[:, 0], values[:, 1]
     slope, middle = 0.5 * (b - a), 0.5 * (a + b) if values.shape[1] == 2 else values[:, 2]
-    bend = 0.5 * (a + b) - middle
-    root = np.sqrt(np.maximum(slope**2 - 4.0 * bend * middle, 0.0))
-    stable = -0.5 * (slope + np.where(slope < 0.0, -root, root))
+    half_curvature = 0.5 * (a + b) - middle
+    root = np.sqrt(np.maximum(slope**2 - 4.0 * half_curvature * middle, 0.0))
+    # The quadratic formula in a form without cancellation.
+    q = -0.5 * (slope + np.where(slope < 0.0, -root, root))
     with np.errstate(divide="ignore", invalid="ignore"):
-        roots = np.stack([stable / bend, middle / stable], axis=1)
-    roots[slope**2 < 4.0 * bend * middle] = np.nan
+        roots = np.stack([q / half_curvature, middle / q], axis=1)
+    roots[slope**2 < 4.0 * half_curvature * middle] = np.nan
     row, number = np.nonzero(np.abs(roots) < 1.0 - LENGTH_ROUND_OFF)
     return row, roots[row, number]
 
@@ -199,20 +203,21 @@ def line_overlap(
         positions = Candidates(block.facets[points.facet], points.shape).positions(deformed)
         pairing = pair(positions, primary, deformed, tolerance)
         # Near a corner, the closest facet may be on a flank that does not face the point.
-        opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), pairing.normal) < -FACING
+        is_opposed = np.einsum("nd,nd->n", normals_at(block, deformed, points), pairing.normal) < -FACING
         # Either all points of a segment face the other side or none, because too few points would not determine a field.
-        is_facing = (pairing.paired & opposite).reshape(-1, k + 2).mean(axis=1) > 0.5
+        is_facing = (pairing.paired & is_opposed).reshape(-1, k + 2).mean(axis=1) > 0.5
         area = np.where(np.repeat(is_facing, k + 2), points.area, 0.0)
         mass = np.zeros((n, k, k))
         np.add.at(mass, points.facet, area[:, None, None] * points.shape[:, :, None] * points.shape[:, None, :])
         masses.append(mass)
         overlap_points.append(OverlapPoints(points.facet, points.shape, area))
-        heights = np.zeros((n, k, 2))
+        gap_reduction = np.zeros((n, k, 2))
         if smoothing is not None and axes is not None:
             on_secondary = facet_offset + points.facet, points.xi[:, None]
-            depth = area * smoothing.overlap(on_secondary, (pairing.facet, pairing.xi), axes)
-            np.add.at(heights, points.facet, points.shape[:, :, None] * (depth[:, None] * pairing.normal)[:, None])
-        gap_reductions.append(heights)
+            volume = area * smoothing.overlap(on_secondary, (pairing.facet, pairing.xi), axes)
+            vectors = (volume[:, None] * pairing.normal)[:, None]
+            np.add.at(gap_reduction, points.facet, points.shape[:, :, None] * vectors)
+        gap_reductions.append(gap_reduction)
         facet_offset += n
         for number, primary_block in enumerate(primary.blocks):
             rows = np.flatnonzero((area > 0) & (pairing.facet >= first[number]) & (pairing.facet < first[number + 1]))

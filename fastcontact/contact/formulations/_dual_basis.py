@@ -30,19 +30,19 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 # Smallest covered fraction, that is, the fraction of the weight of a function that faces the other side. A node with a
 # smaller fraction has no gap, because its weighted gap would be extrapolated from a small part. On facets with
 # ill-conditioned dual functions, a function with a smaller fraction has no dual function.
-COVERED = 0.02
+SMALL_FRACTION = 0.02
 # Covered fractions above this multiple of the largest one count as equal to it, because on curved facets the fractions of
 # fully covered functions differ by a few percent.
-EQUAL = 0.9
+EQUAL_FRACTION = 0.9
 # Dual functions count as ill conditioned if the root mean square of one of them exceeds LARGEST_RMS, or if the integral of
-# one of them is less than LEAST times its weight. Dual functions of complete facets have root mean squares up to 2.4 (nine
-# nodes). If the nodes of one edge have no dual functions, the integrals of the dual functions of the other corners are 0.21
-# times their weights on eight-node quadrangles, and zero on six-node triangles.
-LARGEST_RMS, LEAST = 20.0, 0.1
+# one of them is less than SMALL_INTEGRAL times its weight. Dual functions of complete facets have root mean squares up to
+# 2.4 (nine nodes). If the nodes of one edge have no dual functions, the integrals of the dual functions of the other corners
+# are 0.21 times their weights on eight-node quadrangles, and zero on six-node triangles.
+LARGEST_RMS, SMALL_INTEGRAL = 20.0, 0.1
 
 
 @cache
-def positive(name: str) -> Array:
+def positive_basis(name: str) -> Array:
     r"""Return T (n_nodes, n_nodes) such that :math:`\tilde N = T N` is positive on the facet and sums to one."""
     element = elements.get(name)
     T = np.eye(element.n_nodes)
@@ -67,11 +67,11 @@ def _edges(element: elements.Element) -> tuple[tuple[int, int], ...]:
 
 
 def _bernstein_square(element: elements.Element) -> Array:
-    """Return T (9, 9) of nine-node quadrangles, the tensor product of the matrices of two lines; see `positive`."""
+    """Return T (9, 9) of nine-node quadrangles, the tensor product of the matrices of two lines; see `positive_basis`."""
     line = elements.get("line3")
     index = {-1.0: 0, 1.0: 1, 0.0: 2}
     line_nodes = np.array([[index[float(c)] for c in node] for node in element.nodes])
-    T = positive(line.name)
+    T = positive_basis(line.name)
     return T[np.ix_(line_nodes[:, 0], line_nodes[:, 0])] * T[np.ix_(line_nodes[:, 1], line_nodes[:, 1])]
 
 
@@ -100,38 +100,39 @@ def dual_functions(mass: Array, admissible: Mask, fraction: Array) -> tuple[Arra
     dual, D = biorthogonal(mass, with_dual)
     covered = np.where(with_dual, fraction, -1.0)
     # Nearly equal fractions are treated as equal, so that the choice does not change as facets deform.
-    large = covered >= EQUAL * covered.max(axis=1, keepdims=True)
+    large = covered >= EQUAL_FRACTION * covered.max(axis=1, keepdims=True)
     largest = np.argmax(large, axis=1)[:, None] == np.arange(with_dual.shape[1])
-    for reduced in (with_dual & (fraction > COVERED), with_dual & large, None, with_dual & largest):
+    # None stands for the selection by integrals, which depends on the dual functions of the previous stage.
+    for reduced in (with_dual & (fraction > SMALL_FRACTION), with_dual & large, None, with_dual & largest):
         facets = np.flatnonzero(~_well_conditioned(dual, mass, with_dual))
         if not len(facets):
             break
         if reduced is None:
-            reduced = with_dual & _sufficient(dual, mass)
+            reduced = with_dual & _has_sufficient_integral(dual, mass)
         with_dual[facets] = np.where(np.any(reduced[facets], axis=1, keepdims=True), reduced[facets], with_dual[facets])
         dual[facets], D[facets] = biorthogonal(mass[facets], with_dual[facets])
     return dual, D
 
 
 def _well_conditioned(dual: Array, mass: Array, with_dual: Mask) -> Mask:
-    """Return for which facets (n_facets,) the dual functions are well conditioned according to LARGEST_RMS and LEAST.
+    """Return for which facets (n_facets,) the dual functions are well conditioned.
 
-    `dual` is the first result of `biorthogonal` for `mass` and `with_dual`.
+    The limits are LARGEST_RMS and SMALL_INTEGRAL. `dual` is the first result of `biorthogonal` for `mass` and `with_dual`.
     """
     area = np.maximum(mass.sum(axis=(1, 2)), TINY)
     with np.errstate(invalid="ignore", over="ignore"):
         root_mean_square = np.sqrt(np.einsum("fab,fbc,fac->fa", dual, mass, dual) / area[:, None]).max(axis=1)
         # The dual functions sum to one if all coefficients of their sum are one.
         deviation = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)
-    sufficient = (_sufficient(dual, mass) | ~with_dual).all(axis=1)
+    sufficient = (_has_sufficient_integral(dual, mass) | ~with_dual).all(axis=1)
     return ((root_mean_square <= LARGEST_RMS) & (deviation <= LENGTH_ROUND_OFF) & sufficient) | ~with_dual.any(axis=1)
 
 
-def _sufficient(dual: Array, mass: Array) -> Mask:
-    """Return which dual functions (n_facets, k) have integrals of at least LEAST times the weights of their functions."""
+def _has_sufficient_integral(dual: Array, mass: Array) -> Mask:
+    """Return which dual functions (n_facets, k) have integrals of at least SMALL_INTEGRAL times their weights w."""
     weight = mass.sum(axis=2)
     with np.errstate(invalid="ignore", over="ignore"):
-        return np.asarray(np.einsum("fab,fb->fa", dual, weight) >= LEAST * weight)
+        return np.asarray(np.einsum("fab,fb->fa", dual, weight) >= SMALL_INTEGRAL * weight)
 
 
 def biorthogonal(mass: Array, with_dual: Mask) -> tuple[Array, Array]:

@@ -17,8 +17,8 @@ from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints, Linearised
 from fastcontact.contact.held_motions import (
-    LEANING,
     SAME_DIRECTION,
+    SMOOTH_INCLINATION,
     HeldMotions,
     deflate,
     direction_fields,
@@ -31,7 +31,7 @@ from fastcontact.contact.linearised_geometry import (
     LinearisedPoints,
     NodalNormals,
     Slips,
-    faced,
+    paired_points,
 )
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
@@ -51,9 +51,9 @@ from fastcontact.contact.pairing import (
 )
 from fastcontact.contact.projection import (
     SMALL_OVERHANG,
+    facet_points,
     interpolate,
     nodal_normals,
-    places,
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
@@ -106,7 +106,7 @@ class Formulation(ABC):
         `surface_smoothing`. Mortar sets it by default.
     options : PairOptions
         Options of the pair that do not depend on its formulation, such as its clearance.
-    held : HeldMotions, optional
+    held_motions : HeldMotions, optional
         Directions in which supports and multi-point constraints hold nodes.
     """
 
@@ -122,15 +122,15 @@ class Formulation(ABC):
     slip: str = "symmetric"
     surface_smoothing: bool = False
     options: PairOptions = field(default_factory=PairOptions, repr=False)
-    held: HeldMotions | None = field(default=None, repr=False)
+    held_motions: HeldMotions | None = field(default=None, repr=False)
     # Points (n_points,) that are excluded from contact.
     excluded: Mask = field(init=False, repr=False)
-    # Whether the constraints need tangents, for friction, tying or cohesion.
+    # Whether the constraints need tangents, for friction, tying or a cohesive layer; adhesion needs none.
     has_tangents: bool = field(init=False, repr=False)
 
     name: ClassVar[str]
     # Whether the primary side may be a rigid obstacle.
-    against_obstacles: ClassVar[bool] = True
+    allows_obstacles: ClassVar[bool] = True
     # Whether each node has one gap, which is weighted over the adjacent facets.
     weighs_gaps: ClassVar[bool] = False
 
@@ -153,8 +153,8 @@ class Formulation(ABC):
             self.primary = self._reflected(self.primary) if isinstance(self.primary, Surface) else self.primary
         excluded, cohesion = self.options.excluded, self.options.cohesion
         self.excluded = np.zeros(len(self.points), bool) if excluded is None else excluded
-        slips = cohesion is not None and not cohesion.reversible
-        self.has_tangents = bool(self.friction) or self.options.kind == "tied" or slips
+        has_shear_tractions = cohesion is not None and not cohesion.reversible
+        self.has_tangents = bool(self.friction) or self.options.kind == "tied" or has_shear_tractions
 
     @cached_property
     def smoothing(self) -> Smoothing | None:
@@ -168,11 +168,12 @@ class Formulation(ABC):
     @cached_property
     def symmetry_planes(self) -> list[tuple[Array, Indices]]:
         """The planes of symmetry at the ends of the secondary surface, see `held_motions.symmetry_planes`."""
-        opposite = self.points[self.primary.points]
-        return [] if self.held is None else symmetry_planes(self.held, self.secondary, self.points, opposite)
+        if self.held_motions is None:
+            return []
+        return symmetry_planes(self.held_motions, self.secondary, self.points, self.points[self.primary.points])
 
     @cached_property
-    def at_nodes(self) -> Candidates:
+    def node_candidates(self) -> Candidates:
         """The secondary nodes as candidates."""
         return Candidates.nodes_of(self.secondary)
 
@@ -184,8 +185,12 @@ class Formulation(ABC):
         """
         return True
 
-    def alternates(self, constraints: Constraints) -> bool:
-        """Return whether pairings like `constraints` may alternate, because points lie between facets with other normals."""
+    def may_alternate(self, constraints: Constraints) -> bool:
+        """Return whether repeated pairings may alternate between two states, given the `constraints` of one of them.
+
+        With facet normals, a point opposite an edge may face one of the adjacent facets in one pairing, and the other in the
+        next one.
+        """
         return isinstance(self.primary, Surface) and self.normals == "facet" and self.options.kind != "tied"
 
     @classmethod
@@ -206,7 +211,7 @@ class Formulation(ABC):
     def constraints(self, config: Configuration) -> Constraints:
         """Pair the two sides, and return the constraints of the pair with all its options.
 
-        Options are tied contact, penalties, cohesion, fluid pressure, and constraints that never open.
+        The options include tied contact, penalties, cohesion, fluid pressure, and constraints that never open.
 
         Parameters
         ----------
@@ -255,7 +260,7 @@ class Formulation(ABC):
         if areas is None:
             raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
-            slope, zero = normal.line(-constraints.gaps(config.displacement))
+            slope, zero = normal.tangent(-constraints.gaps(config.displacement))
             constraints = replace(constraints, gap0=constraints.gap0 + zero, softness=1.0 / (slope * areas), law=normal)
         elif normal is not None:
             constraints = replace(constraints, softness=np.asarray(1.0 / (normal * areas)))
@@ -292,19 +297,20 @@ class Formulation(ABC):
         return tied_pair(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
-        """Return the `reduction` of the multipliers of a tied pair; None if no node is held by supports on both sides."""
+        """Return the `tied.reduction` of the multipliers of a tied pair; None if supports hold both sides at no node."""
         # Directions in which all nodes of a facet are held are ignored.
-        held = _without_complete_facets(self._held_on_both_sides(Configuration.undeformed(self.points)), self.secondary)
+        held = self._held_on_both_sides(Configuration.undeformed(self.points))
+        held = _without_complete_facets(held, self.secondary)
         if not (held.any() and constraints.tangents):
             return None
         nodes = self.nodes_of(constraints, moments)
-        frames = [moments @ direction for direction in (normals(constraints.directions), *constraints.directions)]
+        means = [moments @ direction for direction in (normals(constraints.directions), *constraints.directions)]
         # The orthonormal axes nearest to the means do not depend on the choice of the tangents.
-        left, lengths, right = np.linalg.svd(np.stack(frames, axis=1))
+        left, lengths, right = np.linalg.svd(np.stack(means, axis=1))
         axes = (left * (lengths > 0.0)[:, None]) @ right
-        sizes = np.ones(len(nodes)) if areas is None else np.where(np.isfinite(areas), areas, 0.0)
-        held = np.where(sizes[:, None, None] > 0.0, held[nodes], 0.0)
-        return reduction(axes, held, nodes, sizes, self.secondary.beside)
+        finite_areas = np.ones(len(nodes)) if areas is None else np.where(np.isfinite(areas), areas, 0.0)
+        held = np.where(finite_areas[:, None, None] > 0.0, held[nodes], 0.0)
+        return reduction(axes, held, nodes, finite_areas, self.secondary.node_adjacency)
 
     def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
         """Return the secondary node (q,), numbered on its side, of each row of `moments`, see `tied.moments_of`."""
@@ -316,9 +322,9 @@ class Formulation(ABC):
 
     def never_opening(self, positions: Array, config: Configuration) -> Mask:
         """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]."""
-        always = self.options.kind in ALWAYS_CLOSED
-        if always or config.never_opening is None:
-            return np.full(len(positions), always)
+        always_closed = self.options.kind in ALWAYS_CLOSED
+        if always_closed or config.never_opening is None:
+            return np.full(len(positions), always_closed)
         return np.asarray(_values_at(config.never_opening, positions))
 
     def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
@@ -337,15 +343,18 @@ class Formulation(ABC):
         return with_secondary_normals(pairing, self._secondary_normals(candidates, deformed))
 
     @cached_property
-    def _local(self) -> Indices:
+    def _number_on_side(self) -> Indices:
         """Number (n_points,) of each secondary node on its side; zero for other points."""
-        local = np.zeros(len(self.points), np.intp)
-        local[self.secondary.points] = np.arange(len(self.secondary.points))
-        return local
+        numbers = np.zeros(len(self.points), np.intp)
+        numbers[self.secondary.points] = np.arange(len(self.secondary.points))
+        return numbers
 
     def _secondary_normals(self, candidates: Candidates, deformed: Array) -> Array:
-        """Return averaged unit normals (n, dim) of the secondary side at candidates."""
-        at_nodes = nodal_normals(self.secondary, deformed)[self._local[candidates.nodes]]
+        """Return averaged unit normals (n, dim) of the secondary side at candidates.
+
+        `deformed` (n_points, dim) are the current coordinates of all points [length].
+        """
+        at_nodes = nodal_normals(self.secondary, deformed)[self._number_on_side[candidates.nodes]]
         normal = np.einsum("nk,nkd->nd", candidates.shape, at_nodes)
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
 
@@ -354,7 +363,7 @@ class Formulation(ABC):
     ) -> Constraints:
         """Return the constraints of paired candidates, including tangents if `has_tangents`.
 
-        `compliance` couples the constraints, see `Constraints.compliance`.
+        The `compliance`, if any, is `Constraints.compliance`.
         """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
         added = self.added_gap(candidates, pairing, config)
@@ -363,9 +372,9 @@ class Formulation(ABC):
         directions: tuple[Array, ...] = ()
         if self.has_tangents:
             projectors = None
-            if self.friction and self.held is not None and len(self.held.nodes):
+            if self.friction and self.held_motions is not None and len(self.held_motions.nodes):
                 # Projectors onto the directions in which all nodes of a candidate are held.
-                held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
+                held = np.einsum("nk,nkde->nde", candidates.shape, self.held_motions.projectors_at(candidates.nodes))
                 projectors = eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
             axes = tangents(pairing.normal, projectors)
             friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
@@ -377,7 +386,7 @@ class Formulation(ABC):
 
     @property
     def linearised_at_mean(self) -> bool:
-        """Whether gaps are linearised at the mean of the displacements of the pairing and of the solution.
+        """Whether gaps are linearised at the mean of the displacements of the pairing and of its solution.
 
         This reduces the error of a Newton step. Otherwise, they are linearised at the displacements of the pairing.
         """
@@ -387,7 +396,7 @@ class Formulation(ABC):
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array],
         multiplier: Array, tangential: Array, displacement: Array,
     ) -> Linearised:  # fmt: skip
-        """Return the derivatives of the gaps of paired candidates, and of their slips along k tangents (n, dim).
+        """Return the linearised geometry of paired candidates, including slips along the k tangents `directions` (n, dim).
 
         The last three arguments are those of `Geometry`.
         """
@@ -396,46 +405,48 @@ class Formulation(ABC):
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.facing(candidates, config, np.inf)
         coordinates = self.points + config.displacement
-        rise = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, coordinates)
-        points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, config.pose, rise=rise)
+        slope = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, coordinates)
+        options = self.primary, coordinates, self.normals, config.pose
+        points = paired_points(candidates, pairing, rows, *options, slope=slope)
         if self.linearised_at_mean:
-            points.apart = points.apart + points.motion @ (displacement - config.displacement)
-        at_rows = rows, len(multiplier)
-        forces = LinearisedPoints(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
+            points.offset = points.offset + points.motion @ (displacement - config.displacement)
+        arguments = self.secondary, points, None, points.normal, multiplier[rows]
+        linearised = LinearisedPoints(*arguments, rows_in_pair=(rows, len(multiplier)))
         if not directions:
-            return forces
+            return linearised
         moved = replace(config, displacement=displacement)
         slips = self._load_step_slips(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
         if not isinstance(self.primary, Surface) or self.slip != "symmetric":
-            return replace(forces, slips=slips)
-        averaged, smooth = points.averaged, None
+            return replace(linearised, slips=slips)
+        averaged, slip_normals = points.averaged, None
         if averaged is None:
-            place = pairing.places(self.primary, rows)
-            averaged = InterpolatedNormals.smooth(self.primary, coordinates, pairing.facet[rows], place)
-            smooth = averaged, averaged.bend(place.gradient)
-        nodal, local = NodalNormals(self.secondary, coordinates), self._local[candidates.nodes[rows]]
+            feet = pairing.projections(self.primary, rows)
+            averaged = InterpolatedNormals.of_facets(self.primary, coordinates, pairing.facet[rows], feet)
+            slip_normals = averaged, averaged.gradient(feet.gradient)
+        nodal, local = NodalNormals(self.secondary, coordinates), self._number_on_side[candidates.nodes[rows]]
         closing = Closing.of(
             averaged.normal, InterpolatedNormals(nodal, local, candidates.shape[rows]), points.motion @ slips.start
         )
         slips = replace(slips, total=slips.total + closing.vector, closing=closing)
-        return replace(forces, slips=slips, smooth=smooth)
+        return replace(linearised, slips=slips, slip_normals=slip_normals)
 
-    def _load_step_slips(self, mean: csr_array, directions: Array, tangential: Array, config: Configuration) -> Slips:
-        """Return the slips of the load step along tangents (k, m, dim).
+    def _load_step_slips(self, motion: csr_array, directions: Array, tangential: Array, config: Configuration) -> Slips:
+        """Return the slips of the load step along the tangents `directions` (k, m, dim).
 
-        `mean` (m, n_points) maps displacements of points to displacements relative to the primary side. The motion of a rigid
+        `motion` (m, n_points) maps nodal displacements to displacements relative to the primary side. The motion of a rigid
         obstacle in the step is subtracted. `tangential` (m, k) are the tangential forces [force].
         """
         increment, rotation_gradient = config.displacement - config.start, None
-        total = mean @ increment
+        total = motion @ increment
         if isinstance(self.primary, RigidSide):
-            current, initial = (mean @ (self.points + u) for u in (config.displacement, config.start))
+            current, initial = (motion @ (self.points + u) for u in (config.displacement, config.start))
             total -= self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
             if config.pose.angle != config.pose_start.angle:  # The motion is an affine function of the positions.
                 ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
                 unit_motions = self.primary.rigid_motion(ends, ends[:1], config.pose, config.pose_start)
                 rotation_gradient = unit_motions[1:] - unit_motions[0]
-        return Slips(directions, tangential, total, increment, self.points + config.start, turning=rotation_gradient)
+        slip_data = directions, tangential, total, increment, self.points + config.start
+        return Slips(*slip_data, rotation_gradient=rotation_gradient)
 
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
@@ -475,11 +486,11 @@ class Formulation(ABC):
         if options.clearance is not None and len(rows):
             added[rows] += options.clearance(np.einsum("nk,nkd->nd", shape, self.points[nodes]))
         if options.clearance_primary is not None and isinstance(self.primary, Surface) and len(rows):
-            feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+            feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
             added[rows] += options.clearance_primary(np.einsum("nk,nkd->nd", feet.shape, self.points[feet.nodes]))
         added *= config.clearance_factor
-        if config.worn is not None:
-            added[rows] += np.einsum("nk,nk->n", shape, config.worn[nodes])
+        if config.wear_depth is not None:
+            added[rows] += np.einsum("nk,nk->n", shape, config.wear_depth[nodes])
         return added
 
     def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
@@ -496,7 +507,7 @@ class Formulation(ABC):
         return overlap
 
     def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
-        """Return the derivatives (n, dim - 1) of `smoothing_overlap` along primary facets [length].
+        """Return the derivatives (n, dim - 1) of `smoothing_overlap` with respect to primary reference coordinates [length].
 
         `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
         zero on the straight extensions of facets.
@@ -506,7 +517,7 @@ class Formulation(ABC):
         if candidates.facet is None:
             return None
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
-        factor = self.smoothing.shared(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
+        factor = self.smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
         slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
@@ -519,71 +530,75 @@ class Formulation(ABC):
     @cached_property
     def _held_nodes(self) -> Indices:
         """The secondary nodes that supports hold, numbered on the side."""
-        return np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
+        held = () if self.held_motions is None else self.held_motions.nodes
+        return np.flatnonzero(np.isin(self.secondary.points, held))
 
     def _held_projections(self, nodes: Indices, config: Configuration) -> tuple[Pairing, Array]:
         """Return the pairing of secondary `nodes` (n,), and the directions in which their projections are held.
 
         The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
         """
-        assert self.held is not None
+        assert self.held_motions is not None
         candidates = Candidates.at(self.secondary.points[nodes])
         pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         held_primary = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
             rows = np.flatnonzero(pairing.paired)
-            feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            held_primary[rows] = np.einsum("nk,nkde->nde", feet.shape, self.held.at(feet.nodes))
+            feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
+            held_primary[rows] = np.einsum("nk,nkde->nde", feet.shape, self.held_motions.projectors_at(feet.nodes))
         return pairing, held_primary
 
     def _held_on_both_sides(self, config: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
-        if len(nodes) and self.held is not None:
-            P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._held_projections(nodes, config)
+        if len(nodes) and self.held_motions is not None:
+            P = self.held_motions.projectors_at(self.secondary.points[nodes])
+            Q = self._held_projections(nodes, config)[1]
             held[nodes] = eigenspaces(P @ Q @ P, 0.5)
         return held
 
-    def held_across(self, config: Configuration) -> Mask:
+    def nodes_with_prescribed_gap(self, config: Configuration) -> Mask:
         """Return the nodes (n_nodes,) at which supports and multi-point constraints prescribe the gap.
 
         The contact forces of such nodes act between supports. On non-matching meshes, their gaps may depend on displacements
         of other primary nodes, but not on those of secondary nodes, and the constraints are nearly redundant.
         """
-        across = np.zeros(len(self.secondary.points), bool)
-        if self.held is None or self.options.kind == "tied" or not isinstance(self.primary, Surface):
-            return across
-        nodes = np.flatnonzero(np.isin(self.secondary.points, self.held.restrained))
+        prescribed = np.zeros(len(self.secondary.points), bool)
+        if self.held_motions is None or self.options.kind == "tied" or not isinstance(self.primary, Surface):
+            return prescribed
+        nodes = np.flatnonzero(np.isin(self.secondary.points, self.held_motions.restrained))
         if len(nodes):
             candidates = Candidates.at(self.secondary.points[nodes])
             pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
             rows = rows_along(pairing.normal, candidates, pairing, self.primary, self.points.size)
-            size, remaining = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ self.held.motion))
-            across[nodes] = pairing.paired & (remaining < 0.25 * size)
-        return across & ~self.excluded[self.secondary.points]
+            # The gap is prescribed if the free unknowns carry less than half of the length of its row.
+            square, free_square = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ self.held_motions.motion))
+            prescribed[nodes] = pairing.paired & (free_square < 0.25 * square)
+        return prescribed & ~self.excluded[self.secondary.points]
 
-    def undetermined(self, config: Configuration) -> Mask:
+    def nodes_with_undetermined_traction(self, config: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 
         This is the case if supports hold all nodes of a facet, and the other side, in one direction. If supports hold the
-        complete side in a direction along the contact, as in a slice in plane strain, the traction in this direction vanishes
-        and is not undetermined. The gap determines the pressure of a penalty, and the traction of a cohesive layer.
+        complete side in a tangential direction, as in a slice in plane strain, the traction in this direction vanishes and is
+        not undetermined. The gap determines the pressure of a penalty, and the traction of a cohesive layer.
         """
         held_both = self._held_on_both_sides(config)
         if not held_both.any() or self.options.cohesion is not None:
             return np.zeros(len(held_both), bool)
-        along = deflate(held_both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
-        across = held_both - along
+        tangential = deflate(held_both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
+        normal = held_both - tangential
         if self.options.penalty is not None:
-            across = np.zeros_like(across)
+            normal = np.zeros_like(normal)
         if self.options.kind != "tied":
             since_begin = replace(config, start=np.zeros_like(config.displacement))
-            along = self._held_without_motion(since_begin) if self.friction else np.zeros_like(held_both)
-        elsewhere = np.eye(held_both.shape[1]) - eigenspaces(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
-        across, along = (held - _without_complete_facets(held, self.secondary) for held in (across, along))
-        return np.asarray(np.trace(across + elsewhere @ along @ elsewhere, axis1=1, axis2=2) > 0.5)
+            tangential = self._held_without_motion(since_begin) if self.friction else np.zeros_like(held_both)
+        # Projector that removes the tangential directions in which the complete side is held.
+        remaining = np.eye(held_both.shape[1]) - eigenspaces(tangential.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
+        normal, tangential = (held - _without_complete_facets(held, self.secondary) for held in (normal, tangential))
+        return np.asarray(np.trace(normal + remaining @ tangential @ remaining, axis1=1, axis2=2) > 0.5)
 
-    def without_slip(self, config: Configuration) -> list[tuple[Array, Mask]]:
+    def directions_without_slip(self, config: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions in which supports hold both sides without relative motion.
 
         In a plane of symmetry or on an axis, slip in these directions is zero for every traction, so that the traction is
@@ -599,22 +614,23 @@ class Formulation(ABC):
         return direction_fields(held, self.points[self.secondary.points])
 
     def _held_without_motion(self, config: Configuration) -> Array:
-        """Return projectors (n_nodes, dim, dim) onto the directions of `without_slip`, including those of complete facets."""
+        """Return projectors (n_nodes, dim, dim) onto `directions_without_slip`, including those of complete facets."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
-        if not len(nodes) or self.held is None:
+        if not len(nodes) or self.held_motions is None:
             return held
         pairing, held_opposite = self._held_projections(nodes, config)
         points = self.secondary.points[nodes]
-        common, slip = self.held.at(points), (config.displacement - config.start)[points]
+        common, slip = self.held_motions.projectors_at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
             slip = slip - self.rigid_motion(Candidates.at(points), config)
         else:
             rows = np.flatnonzero(pairing.paired)
-            feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            held_primary, motion = self.held.at(feet.nodes), (config.displacement - config.start)[feet.nodes]
+            feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
+            held_primary = self.held_motions.projectors_at(feet.nodes)
+            motion = (config.displacement - config.start)[feet.nodes]
             mean = np.einsum("nk,nkd->nd", feet.shape, motion)
-            # If an inclined normal intersects the primary side slightly beside a held node, the motion of the other nodes of
-            # this facet is ignored.
+            # The point opposite to a held node may lie slightly off the held primary node, if the normal is inclined. The
+            # motion of the other nodes of this facet is then ignored.
             excess = np.einsum("nk,nkde,nkd->ne", feet.shape, held_primary, motion - mean[:, None])
             slip[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
             common = eigenspaces(common @ held_opposite @ common, 0.5)
@@ -635,19 +651,19 @@ class Formulation(ABC):
 
         A plane of symmetry is recognised by supports along its normal at the edge of the side.
         """
-        if self.held is None or not np.isin(side.points, self.held.nodes).any():
+        if self.held_motions is None or not np.isin(side.points, self.held_motions.nodes).any():
             return side
-        held = _without_complete_facets(self.held.at(side.points), side)
+        held = _without_complete_facets(self.held_motions.projectors_at(side.points), side)
         normal = nodal_normals(side, self.points)
-        across = np.linalg.norm(np.einsum("nde,ne->nd", held, normal), axis=1)
-        nodes = np.flatnonzero(held.any(axis=(1, 2)) & (across < LEANING))
+        inclination = np.linalg.norm(np.einsum("nde,ne->nd", held, normal), axis=1)
+        nodes = np.flatnonzero(held.any(axis=(1, 2)) & (inclination < SMOOTH_INCLINATION))
         reflections = np.eye(self.points.shape[1]) - 2.0 * held[nodes]
         return replace(side, periodic_ends=(*side.periodic_ends, (nodes, nodes, reflections)))
 
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
     ) -> Array:
-        """Return the correction (k, n) of slips by the motion that closes gaps [length].
+        """Return the correction (k, n) of slips for the motion that closes gaps [length].
 
         On curved surfaces, in particular at the edge of the contact, the normal of the primary side is inclined to the
         direction in which the gap closes. A component of this motion would then count as slip. The correction assumes that
@@ -657,7 +673,7 @@ class Formulation(ABC):
         deformed, start = self.points + config.displacement, self.points + config.start
         slip0 = np.zeros((len(directions), len(pairing.paired)))
         rows = np.flatnonzero(pairing.paired)
-        feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+        feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         primary_normals = interpolate(smooth_normals(self.primary, deformed)[pairing.facet[rows]], feet)
         mean = primary_normals - self._secondary_normals(Candidates(nodes, shape), deformed)
@@ -665,9 +681,9 @@ class Formulation(ABC):
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
         offset = np.einsum("nk,nkd->nd", shape, start[nodes])
         offset -= np.einsum("nk,nkd->nd", feet.shape, start[feet.nodes])
-        opening = np.einsum("nd,nd->n", mean, offset)
+        initial_gap = np.einsum("nd,nd->n", mean, offset)
         for k, tangent in enumerate(directions):
-            slip0[k, rows] = np.einsum("nd,nd->n", tangent[rows], mean) * opening
+            slip0[k, rows] = np.einsum("nd,nd->n", tangent[rows], mean) * initial_gap
         return slip0
 
     def first_contact(self, config: Configuration) -> tuple[Array, Array]:
@@ -678,8 +694,8 @@ class Formulation(ABC):
         """
         positions = self.points[self.secondary.points]
         gap, normal = self.nodal_gap(replace(config, displacement=np.zeros_like(self.points)))
-        nearest_nodes = np.flatnonzero(gap <= gap.min() + LENGTH_ROUND_OFF * np.ptp(positions, axis=0).max())
-        first = nearest_nodes[np.argmin(np.linalg.norm(positions[nearest_nodes], axis=1))]
+        closest_nodes = np.flatnonzero(gap <= gap.min() + LENGTH_ROUND_OFF * np.ptp(positions, axis=0).max())
+        first = closest_nodes[np.argmin(np.linalg.norm(positions[closest_nodes], axis=1))]
         return positions[first], normal[first]
 
     def nodal_gap(
@@ -703,7 +719,7 @@ class Formulation(ABC):
         normal : ndarray (n_nodes, dim)
             Unit normals of the primary side [-].
         """
-        nodes = self.at_nodes
+        nodes = self.node_candidates
         pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if self.smoothing is not None:
@@ -714,11 +730,11 @@ class Formulation(ABC):
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 
     def nodal_slip(self, config: Configuration) -> Array:
-        """Return the slip increment (m, dim) of the secondary nodes [length].
+        """Return the slips (n_nodes, dim) of the secondary nodes in the load step, as vectors [length].
 
-        It includes nodes beyond the end of the other side, which may carry pressure because parts of their facets face it.
+        Nodes beyond the end of the primary side are included, because parts of their facets may carry pressure.
         """
-        nodes = self.at_nodes
+        nodes = self.node_candidates
         pairing = self.facing(nodes, config, np.inf)
         directions = tangents(pairing.normal)
         rows, slip0 = self.slips(nodes, pairing, directions, config)
@@ -735,9 +751,9 @@ def _without_complete_facets(held: Array, side: Surface) -> Array:
     """
     span = np.zeros_like(held)
     for block in side.blocks:
-        of_nodes = held[block.local]
-        vectors = np.linalg.eigh(of_nodes.mean(axis=1))[1]
-        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, of_nodes, vectors).min(axis=1) >= SAME_DIRECTION**2
+        projectors = held[block.local]
+        vectors = np.linalg.eigh(projectors.mean(axis=1))[1]
+        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, projectors, vectors).min(axis=1) >= SAME_DIRECTION**2
         vectors = np.where(is_common[:, None], vectors, 0.0)
         np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
     return eigenspaces(held - held @ eigenspaces(span, 0.5) @ held, 0.5)

@@ -64,17 +64,18 @@ class Overlap:
         For each block of the secondary side, integrals of products of two of its shape functions over the part that
         faces the primary side [area].
     couplings : list of Coupling
-    closer : list of ndarray (n_facets, n_nodes, dim)
-        For each block, integrals of its shape functions times vectors along the normals of the primary side. Their lengths
+    gap_reductions : list of ndarray (n_facets, n_nodes, dim)
+        For each block, integrals of its shape functions times vectors along the normals of the primary side, whose lengths
         are the distances by which the smooth surfaces are closer to each other than the facets, see `surface_smoothing`
-        [volume]. Against an obstacle, which has no points in the mesh, the vectors are the opposite positions.
+        [volume]. Against an obstacle, which has no nodes, the vectors are the positions of the opposite points instead, so
+        that the weighted gaps are also correct in this case.
     points : list of OverlapPoints
         For each block, the integration points; empty in 3D, where the mortar segments are divided into triangles.
     """
 
     mass: list[Array]
     couplings: list[Coupling]
-    closer: list[Array]
+    gap_reductions: list[Array]
     points: list[OverlapPoints]
 
 

@@ -37,7 +37,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Geometry, Linearised, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.integration import NO_AREA
+from fastcontact.contact.integration import NEGLIGIBLE_AREA
 from fastcontact.contact.linearised_geometry import LinearisedPoints
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
@@ -46,10 +46,10 @@ from fastcontact.errors import ContactError
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Largest ratio of the component of a pressure along a support to the limit of friction; see `_tractions_at_supports`. With a
+# Largest ratio of the component of a pressure along a support to the limit of friction; see `_compliance_at_supports`. With a
 # ratio of one and a coefficient of friction of 0.3, facets at 22 degrees to a plane of symmetry penetrate by 0.5 % of the
 # displacement.
-PART_OF_CONE = 0.5
+LARGEST_PRESSURE_COMPONENT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,15 +60,15 @@ class PressureField(NodalField):
     ----------
     projection : Projection
         Map from point forces to the independent values of the field.
-    nodes : csr_array (n_nodes, k)
+    nodal_map : csr_array (n_nodes, k)
         Map from the k independent values to the values at all nodes [-].
     independent : ndarray of int (k,)
         Node of each independent value, numbered on the secondary side.
-    around : ndarray of int (m, n)
+    facet_nodes : ndarray of int (m, n)
         The n nodes of the facet of each of m integration points, numbered on the secondary side.
     shape : ndarray (m, n)
         Values of their shape functions at the point [-].
-    renewed : bool
+    has_new_points : bool
         Whether each pairing creates new integration points.
     nodal_areas : ndarray (n_nodes,)
         Integrals of the shape functions over the complete secondary side, by quadrature at the integration points [area].
@@ -80,11 +80,11 @@ class PressureField(NodalField):
     """
 
     projection: Projection
-    nodes: csr_array
+    nodal_map: csr_array
     independent: Indices
-    around: Indices
+    facet_nodes: Indices
     shape: Array
-    renewed: bool
+    has_new_points: bool
     nodal_areas: Array
     covered_areas: Array
     axes: tuple[Array, Array] | None = None
@@ -92,34 +92,34 @@ class PressureField(NodalField):
     @classmethod
     def of_points(
         cls, points: tuple[Indices, Array], areas: tuple[Array, Array], rho: float,
-        field: tuple[csr_array, Indices], renewed: bool, eliminable: bool = False, quadratic: bool = False,
+        field: tuple[csr_array, Indices], has_new_points: bool, eliminable: bool = False, quadratic: bool = False,
     ) -> PressureField:  # fmt: skip
         """Return the pressure field of m integration points.
 
         Parameters
         ----------
         points : (ndarray of int (m, n), ndarray (m, n))
-            `around` and `shape`.
+            `facet_nodes` and `shape`.
         areas : (ndarray (m,), ndarray (m,))
             Areas of the points, first with zeros at points that cannot carry forces, then of all points [area].
         rho : float
             The constant of the augmented Lagrangian [pressure / length].
         field : (csr_array (n_nodes, k), ndarray of int (k,))
-            `nodes` and `independent`.
-        renewed, eliminable, quadratic : bool
+            `nodal_map` and `independent`.
+        has_new_points, eliminable, quadratic : bool
             See `PressureField` and `Projection`.
         """
-        (around, shape), (nodes, independent), (usable_areas, full_areas) = points, field, areas
-        P = shapes_at(shape, around, nodes.shape[0])
+        (facet_nodes, shape), (nodal_map, independent), (usable_areas, full_areas) = points, field, areas
+        P = shapes_at(shape, facet_nodes, nodal_map.shape[0])
         covered, total = P.T @ usable_areas, P.T @ full_areas
-        P = csr_array(P @ nodes)
+        P = csr_array(P @ nodal_map)
         mass = splu((P.T @ diags_array(usable_areas) @ P).tocsc()) if len(independent) else None
         projection = Projection(P, usable_areas, rho, mass, eliminable, quadratic)
-        return cls(projection, nodes, independent, around, shape, renewed, total, covered)
+        return cls(projection, nodal_map, independent, facet_nodes, shape, has_new_points, total, covered)
 
     def pressure(self, force: Array) -> Array:
         """Return the field (n_nodes, ...) at the nodes [pressure]; it may be slightly negative outside the contact."""
-        return self.nodes @ self.projection.field(force)
+        return self.nodal_map @ self.projection.field(force)
 
     def traction(self, force: Array) -> Array:
         """Return nodal tractions (n_nodes, dim) for point forces (m, dim); see `NodalField`."""
@@ -135,7 +135,7 @@ class PressureField(NodalField):
         with_area = np.abs(areas) > LENGTH_ROUND_OFF * np.abs(areas).max(initial=0.0)
         return np.divide(self.covered_areas, areas, out=np.ones_like(areas), where=with_area)
 
-    def shares(self, force: Array) -> Array:
+    def nodal_forces(self, force: Array) -> Array:
         """Return the products (n_nodes,) of the field and the covered areas [force]."""
         return self.pressure(force) * self.covered_areas
 
@@ -147,11 +147,12 @@ class PressureField(NodalField):
         """
         usable, n = np.isfinite(gaps), len(self.nodal_areas)
         weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
-        total = np.bincount(self.around.ravel(), weight.ravel(), n)
-        sums = np.bincount(self.around.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
-        valid = total > NO_AREA * total.max(initial=0.0)
-        largest = np.where(valid[self.around], self.shape, -np.inf).argmax(axis=1)
-        return np.divide(sums, total, out=np.full(n, np.inf), where=valid), self.around[np.arange(len(gaps)), largest]
+        total = np.bincount(self.facet_nodes.ravel(), weight.ravel(), n)
+        sums = np.bincount(self.facet_nodes.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
+        valid = total > NEGLIGIBLE_AREA * total.max(initial=0.0)
+        largest = np.where(valid[self.facet_nodes], self.shape, -np.inf).argmax(axis=1)
+        nearest = self.facet_nodes[np.arange(len(gaps)), largest]
+        return np.divide(sums, total, out=np.full(n, np.inf), where=valid), nearest
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes in contact; see `NodalField`.
@@ -166,37 +167,37 @@ class PressureField(NodalField):
 
         Nodal gaps are not used: between facets of different curvature, nodes of facets in contact have open gaps.
         """
-        with_area = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
-        around, shape, n = self.around[active], self.shape[active], len(gap)
-        closed = _nearest(around, shape, n) | _nearest(around, np.where(with_area[around], shape, -np.inf), n)
-        usable, of_active_facet = self.projection.areas > 0, np.zeros(len(gap), bool)
-        of_active_facet[around] = True
-        closed |= of_active_facet & ~_nearest(self.around[usable], self.shape[usable], len(gap))
+        with_area = self.nodal_areas > NEGLIGIBLE_AREA * self.nodal_areas.max(initial=0.0)
+        nodes, shape, n = self.facet_nodes[active], self.shape[active], len(gap)
+        closed = _nearest(nodes, shape, n) | _nearest(nodes, np.where(with_area[nodes], shape, -np.inf), n)
+        usable, of_active_facet = self.projection.areas > 0, np.zeros(n, bool)
+        of_active_facet[nodes] = True
+        closed |= of_active_facet & ~_nearest(self.facet_nodes[usable], self.shape[usable], n)
         closed &= pressure > 0
         # Forces at one end of a facet, opposite an edge, may cause a negative pressure at the nearest node.
-        nodes_of_open_facets = self.around[active][~closed[self.around[active]].any(axis=1)]
+        nodes_of_open_facets = nodes[~closed[nodes].any(axis=1)]
         closed[nodes_of_open_facets[pressure[nodes_of_open_facets] > 0]] = True
         return closed
 
-    def initially_active(self, gap: Array, pressure: Array, last: Mask) -> Mask:
+    def initial_active_set(self, gap: Array, pressure: Array, previous: Mask) -> Mask:
         """Return the points (m,) at which the field exceeds rho times the gap, as an initial active set.
 
-        If all pairings have the same points, the result is `last`.
+        If all pairings have the same points, the result is `previous`.
         """
-        if not self.renewed:
-            return last
+        if not self.has_new_points:
+            return previous
         field = self.projection.P @ pressure[self.independent]
         return (self.projection.areas > 0) & (field - self.projection.rho * gap > 0)
 
 
-def _nearest(around: Indices, shape: Array, n_nodes: int) -> Mask:
+def _nearest(facet_nodes: Indices, shape: Array, n_nodes: int) -> Mask:
     """Return the nodes (n_nodes,) whose shape function is the largest one at any of m points.
 
-    `around` (m, n) are the nodes of the facet of each point, and `shape` (m, n) their shape functions. If several shape
+    `facet_nodes` (m, n) are the nodes of the facet of each point, and `shape` (m, n) their shape functions. If several shape
     functions are equally large, all of their nodes count.
     """
     nearest = np.zeros(n_nodes, bool)
-    nearest[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - LENGTH_ROUND_OFF]] = True
+    nearest[facet_nodes[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - LENGTH_ROUND_OFF]] = True
     return nearest
 
 
@@ -234,27 +235,29 @@ class PressureFieldFormulation(Formulation):
     def dependent_nodes(self, config: Configuration) -> Mask:
         """Return the nodes (n_nodes,) whose values follow from those of their neighbours.
 
-        They are excluded or `held_across`. Values on facets of which all nodes are held remain independent.
+        They are excluded nodes, and nodes with a prescribed gap. However, values on facets at whose nodes all gaps are
+        prescribed remain independent.
         """
-        held, dependent = self.held_across(config), self.excluded[self.secondary.points]
-        on_held_facets = np.zeros_like(held)
+        prescribed, excluded = self.nodes_with_prescribed_gap(config), self.excluded[self.secondary.points]
+        on_prescribed_facets = np.zeros_like(prescribed)
         for block in self.secondary.blocks:
-            on_held_facets[block.local[held[block.local].all(axis=1)]] = True
-        return dependent | (held & ~on_held_facets)
+            on_prescribed_facets[block.local[prescribed[block.local].all(axis=1)]] = True
+        return excluded | (prescribed & ~on_prescribed_facets)
 
-    def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
-        """Return a pressure field in which the nodes of `PairOptions.representatives` have a common value.
+    def with_common_values(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
+        """Return a pressure field in which nodes with the same `PairOptions.representatives` have a common value.
 
         Both `field` and the result consist of the map (n_nodes, k) from independent to nodal values, and the nodes (k,) of
         the independent values.
         """
-        (values, nodes), representatives = field, self.options.representatives
+        (nodal_map, nodes), representatives = field, self.options.representatives
         if representatives is None:
             return field
         first, column = np.unique(representatives[self.secondary.points[nodes]], return_inverse=True)
         independent = np.empty(len(first), np.intp)
         independent[column] = nodes
-        return csr_array(values @ csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), column)))), independent
+        common = csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), column)))
+        return csr_array(nodal_map @ common), independent
 
     def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
         """Return the node (q,) of each row of `moments`; see `Formulation`.
@@ -264,30 +267,31 @@ class PressureFieldFormulation(Formulation):
         """
         field = constraints.nodal
         assert isinstance(field, PressureField)
-        single = moments.indices[moments.indptr[len(field.independent) : -1]]
-        return np.concatenate([field.independent, field.around[single, field.shape[single].argmax(axis=1)]])
+        points = moments.indices[moments.indptr[len(field.independent) : -1]]
+        return np.concatenate([field.independent, field.facet_nodes[points, field.shape[points].argmax(axis=1)]])
 
-    def of_points(
+    def constraints_of_points(
         self, candidates: Candidates, pairing: Pairing, field: PressureField, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired integration points, with the compliance C of the pressure field."""
         projection = field.projection
         constraints = self.assembled(candidates, pairing, projection, config)
-        directions, turning = constraints.directions, self.options.turning
-        if constraints.tangents and turning is not None:
-            axes = turning.axes(constraints.positions), turning.axes(self.points[self.secondary.points])
+        directions, rotation = constraints.directions, self.options.sector_rotation
+        if constraints.tangents and rotation is not None:
+            axes = rotation.axes(constraints.positions), rotation.axes(self.points[self.secondary.points])
             field = replace(field, axes=axes)
             directions = tuple(np.einsum("mde,md->me", axes[0], t) for t in directions)
         if constraints.tangents and constraints.geometry is not None:
-            constraints = replace(constraints, geometry=partial(_elastic, constraints.geometry, projection, field.axes))
-        Z = self._tractions_at_supports(field, constraints, directions, config) if self.friction else np.empty(0)
+            geometry = partial(_with_compliance, constraints.geometry, projection, field.axes)
+            constraints = replace(constraints, geometry=geometry)
+        Z = self._compliance_at_supports(field, constraints, directions, config) if self.friction else np.empty(0)
         areas = np.where(projection.areas > 0, projection.areas, np.inf)
         return replace(constraints, low_rank_compliance=Z, areas=areas, nodal=field, coupled_directions=directions)
 
-    def _tractions_at_supports(
+    def _compliance_at_supports(
         self, field: PressureField, constraints: Constraints, directions: tuple[Array, ...], config: Configuration
     ) -> Array:
-        """Return the factor of a compliance that determines tangential tractions at nodes where both sides are held.
+        """Return the factor of a compliance that determines the tangential tractions at nodes where both sides are held.
 
         Supports prevent slip at these nodes, so that the tractions do no work, and no equation determines them. The
         compliance makes the tractions vanish, together with the tangential components of pressures that are slightly
@@ -297,38 +301,39 @@ class PressureFieldFormulation(Formulation):
         `Constraints.low_rank_compliance`, or an empty array if no such node exists.
         """
         factors = []
-        for held, nodes in self.without_slip(config):
+        for direction, nodes in self.directions_without_slip(config):
             columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
                 Z = field.projection.compliance_factor(columns)
-                in_axes = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
+                in_axes = direction if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], direction)
                 at_points = field.projection.P @ in_axes[field.independent]
                 axes = normals(directions), *directions
-                components = np.stack([np.einsum("nd,nd->n", direction, at_points) for direction in axes])
+                components = np.stack([np.einsum("nd,nd->n", axis, at_points) for axis in axes])
                 factor = components[:, :, None] * Z
                 pressure, shear = (np.linalg.norm(values, axis=(0, 1)) for values in (factor[:1], factor[1:]))
-                factor[0, :, pressure > PART_OF_CONE * constraints.friction.max() * shear] = 0.0
+                factor[0, :, pressure > LARGEST_PRESSURE_COMPONENT * constraints.friction.max() * shear] = 0.0
                 factors.append(factor)
         return np.concatenate(factors, axis=2) if factors else np.empty(0)
 
 
-def _elastic(
+def _with_compliance(
     geometry: Geometry, projection: Projection, axes: tuple[Array, Array] | None, multiplier: Array, tangential: Array,
     displacement: Array,
 ) -> Linearised:  # fmt: skip
     """Return the linearised geometry of constraints whose force vectors are coupled by the compliance of a multiplier field.
 
     `geometry` is the geometry without compliance, `projection` the multiplier field, and `axes` its `PressureField.axes`.
+    The last three arguments are those of `Geometry`.
     """
     linearised = geometry(multiplier, tangential, displacement)
     assert isinstance(linearised, LinearisedPoints)
-    assert linearised.place is not None
-    rows, count = linearised.place
+    assert linearised.rows_in_pair is not None
+    rows, count = linearised.rows_in_pair
 
-    def elastic(force: Array) -> Array:
+    def elastic_displacements(force: Array) -> Array:
         forces = np.zeros((count, force.shape[1]))
         forces[rows] = force if axes is None else np.einsum("mde,md->me", axes[0][rows], force)
         displacements = projection.apply(forces)[rows]
         return displacements if axes is None else np.einsum("mde,me->md", axes[0][rows], displacements)
 
-    return replace(linearised, compliance=elastic)
+    return replace(linearised, compliance=elastic_displacements)

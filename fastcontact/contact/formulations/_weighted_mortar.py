@@ -29,10 +29,10 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Linearised, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import facets_at_ends, line_overlap
-from fastcontact.contact.formulations._dual_basis import COVERED, LEAST, dual_functions, positive
+from fastcontact.contact.formulations._dual_basis import SMALL_FRACTION, SMALL_INTEGRAL, dual_functions, positive_basis
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
-from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
+from fastcontact.contact.integration import NEGLIGIBLE_AREA, areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import (
     Closing,
     Differences,
@@ -40,17 +40,17 @@ from fastcontact.contact.linearised_geometry import (
     NodalNormals,
     Points,
     Substitution,
-    faced,
+    paired_points,
 )
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import FACING, Candidates, Normals, pair, tangents
 from fastcontact.contact.projection import nodal_normals, normals_at_nodes, smooth_normals
-from fastcontact.contact.search.limits import BEYOND
+from fastcontact.contact.search.limits import LARGEST_OVERHANG
 from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements
-from fastcontact.round_off import DIFFERENCES, LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
+from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
 
@@ -68,7 +68,7 @@ class Coverage(NamedTuple):
     functions : list of (ndarray (n_facets, k, k), ndarray (n_facets, k, k))
         For each block, the coefficients of the functions psi in terms of the shape functions [-], and the integrals of
         products of both [area].
-    values : csr_array (m, m)
+    nodal_map : csr_array (m, m)
         Map from independent to nodal values of the multiplier field [-].
     """
 
@@ -76,38 +76,38 @@ class Coverage(NamedTuple):
     weights: list[Array]
     with_gap: Mask
     functions: list[tuple[Array, Array]]
-    values: csr_array
+    nodal_map: csr_array
 
 
 class Means(NamedTuple):
-    """Mean relative motions of the secondary nodes, and their weights.
+    """Weighted means at the secondary nodes of the motion relative to the primary side.
 
     Attributes
     ----------
     coverage : Coverage
-    rows, across : csr_array (m, n_points)
-        Integrals of psi times the secondary and times the primary shape functions [area].
+    D, M : csr_array (m, n_points)
+        Mortar matrices: integrals of psi times the secondary and times the primary shape functions [area].
     weight : ndarray (m,)
         Integrals of psi; infinite for nodes without gaps [area].
     motion : csr_array (m, n_points)
-        Map from displacements to mean displacements relative to the primary side [-].
-    closer : ndarray (m, dim)
-        Mean vectors by which the smooth surfaces are closer to each other than the facets [length].
+        Map ``(D - M) / weight`` from displacements to mean displacements relative to the primary side [-].
+    gap_reduction : ndarray (m, dim)
+        Mean vectors of `Overlap.gap_reductions` [length].
     normal : ndarray (m, dim)
         Unit normals [-].
     """
 
     coverage: Coverage
-    rows: csr_array
-    across: csr_array
+    D: csr_array
+    M: csr_array
     weight: Array
     motion: csr_array
-    closer: Array
+    gap_reduction: Array
     normal: Array
 
 
 class SlipData(NamedTuple):
-    """Data of the slips of nodes.
+    """Quantities from which the slips of nodes are linearised.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class SlipData(NamedTuple):
     length : ndarray (m,)
         Lengths by which gaps close in the step [length].
     substitutions : list of (Substitution, Coverage)
-        Additional slips in directions in which supports hold both sides, and the coverage without the held nodes.
+        Additional slips in directions in which supports hold both sides, each with the coverage without the held nodes.
     """
 
     tangents: Array
@@ -144,24 +144,26 @@ class WeightedMortar(Formulation):
 
     name: ClassVar[str] = "mortar"
     weighs_gaps: ClassVar[bool] = True
-    _whole: list[Array] = field(init=False, repr=False)
+    # For each block, the coefficients (k, k) of the test functions in terms of the shape functions [-], and the integrals
+    # (n_facets, k) of the test functions over complete facets [area].
     _test: list[Array] = field(init=False, repr=False)
+    _full_weights: list[Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if str(self.multipliers) not in MULTIPLIERS:
             raise ContactError(unknown("kind of multipliers", self.multipliers, MULTIPLIERS))
-        self._test, self._whole = [], []
+        self._test, self._full_weights = [], []
         for block in self.secondary.blocks:
             if self.multipliers == "dual":
-                T = positive(block.element)
+                T = positive_basis(block.element)
             else:  # shape functions of the corners, and zero at mid-side nodes
                 element = elements.get(block.element)
                 linear = elements.get(element.linear).shape(element.nodes).T
                 T = np.vstack([linear, np.zeros((element.n_nodes - element.n_corners, element.n_nodes))])
             self._test.append(T)
             N, dA = areas_of_rule(block, self.points, self.axisymmetric)
-            self._whole.append(dA @ N @ T.T)
+            self._full_weights.append(dA @ N @ T.T)
 
     @property
     def eliminable(self) -> bool:
@@ -176,21 +178,19 @@ class WeightedMortar(Formulation):
         options = self.axisymmetric, self.projection_tolerance, self.smoothing
         return line_overlap(self.secondary, self.primary, self.points, deformed, *options)
 
-    def alternates(self, constraints: Constraints) -> bool:
+    def may_alternate(self, constraints: Constraints) -> bool:
         """See `Formulation`; a node with dual functions and a small overlap may have a gap in every other pairing."""
-        covered = np.zeros(1) if constraints.nodal is None else np.asarray(constraints.nodal.covered)
-        small = (
-            self.multipliers == "dual"
-            and self.options.kind != "tied"
-            and bool(((covered > 0.0) & (covered < LEAST)).any())
-        )
-        return small or super().alternates(constraints)
+        if self.multipliers == "dual" and self.options.kind != "tied" and constraints.nodal is not None:
+            covered = np.asarray(constraints.nodal.covered)
+            if ((covered > 0.0) & (covered < SMALL_INTEGRAL)).any():
+                return True
+        return super().may_alternate(constraints)
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         means = self._means(self.points + config.displacement, config)
         # Tied pairs have separate equations for the directions in which both sides are held.
-        held = self.without_slip(config) if self.has_tangents and self.options.kind != "tied" else []
+        held = self.directions_without_slip(config) if self.has_tangents and self.options.kind != "tied" else []
         constraints, slip_data = self._weighted_gaps(config, means, held)
         return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
 
@@ -199,21 +199,21 @@ class WeightedMortar(Formulation):
     ) -> tuple[Constraints, SlipData | None]:
         """Return the constraints without their derivatives, and the data of their slips.
 
-        `held` are the directions `without_slip`. The data are None without tangents.
+        `held` are the `directions_without_slip`. The data are None without tangents.
         """
-        coverage, rows, across, weight, mean, closer, normal = means
-        B = rows_of(mean, normal)
-        gap0 = B @ self.points.ravel() + config.clearance_factor * self._clearance(rows, across, weight)
-        gap0 -= np.einsum("nd,nd->n", closer, normal)
-        dependent = coverage.values.diagonal() == 0.0
-        if dependent.any():  # Gaps that supports prescribe neither open nor close those of neighbouring nodes.
+        coverage, D, M, weight, motion, gap_reduction, normal = means
+        B = rows_of(motion, normal)
+        gap0 = B @ self.points.ravel() + config.clearance_factor * self._clearance(D, M, weight)
+        gap0 -= np.einsum("nd,nd->n", gap_reduction, normal)
+        dependent = coverage.nodal_map.diagonal() == 0.0
+        if dependent.any():  # Gaps that supports prescribe must not contribute to the gaps of neighbouring nodes.
             prescribed = np.where(dependent, self.nodal_gap(config)[0], 0.0)
-            gap0 -= csr_array(rows[:, self.secondary.points]) @ prescribed / weight
-        if config.worn is not None:
-            gap0 += rows @ config.worn / weight
+            gap0 -= csr_array(D[:, self.secondary.points]) @ prescribed / weight
+        if config.wear_depth is not None:
+            gap0 += D @ config.wear_depth / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        side = self._whole_side
-        pressures = WeightedPressures(weight, coverage.values, coverage.values.T @ side[0], *side[1:])
+        nodal_map, constants = coverage.nodal_map, self._constant_attributes
+        pressures = WeightedPressures(weight, nodal_map, nodal_map.T @ constants[0], *constants[1:])
         constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=pressures)
         if not self.has_tangents:
             return constraints, None
@@ -221,42 +221,43 @@ class WeightedMortar(Formulation):
         for axis, nodes_held in held:
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
         mu, directions, slip_axes = self.options.friction_axes(
-            self.friction, tangents(normal, projectors), self.at_nodes
+            self.friction, tangents(normal, projectors), self.node_candidates
         )
-        slips, substitutions = self._slips(slip_axes, held, coverage, mean, rows, weight)
+        slips, substitutions = self._slips(slip_axes, held, means)
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
         # Part of the relative motion that is not slip: that of a rigid obstacle, or minus the motion that closes the gap.
         if not isinstance(self.primary, RigidSide):
             non_slip = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
-            current, before = (mean @ (self.points + u) for u in (config.displacement, config.start))
-            non_slip = self.primary.rigid_motion(current, before, config.pose, config.pose_start)
+            current, initial = (motion @ (self.points + u) for u in (config.displacement, config.start))
+            non_slip = self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
         slip0 = -np.stack([np.einsum("nd,nd->n", t, non_slip) for t in slip_axes])
         for substitution, _ in substitutions:
             slip0 += np.stack([np.einsum("nd,nd->n", t, substitution.closing(closing)) for t in slip_axes])
         constraints = replace(constraints, tangents=slips, directions=directions, friction=mu, slip0=slip0)
         return constraints, SlipData(np.stack(slip_axes), length, substitutions)
 
-    def _means(self, deformed: Array, config: Configuration, like: Coverage | None = None) -> Means:
-        """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
+    def _means(self, deformed: Array, config: Configuration, earlier: Coverage | None = None) -> Means:
+        """Return the weighted means at the coordinates `deformed` (n_points, dim) [length].
 
-        Nodes with gaps are those of the coverage `like`; by default, they result from the overlap.
+        If an `earlier` coverage is given, its nodes have gaps. By default, these nodes result from the overlap.
         """
         overlap = self._overlap(deformed, config.pose)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        if like is None:
-            with_gap = self._nodes_with_gaps(weights, LEAST if config.rounded else COVERED)
-            coverage = self._coverage(overlap, weights, with_gap, self._values(with_gap, self.held_across(config)))
+        if earlier is None:
+            with_gap = self._nodes_with_gaps(weights, SMALL_INTEGRAL if config.rounded else SMALL_FRACTION)
+            nodal_map = self._nodal_map(with_gap, self.nodes_with_prescribed_gap(config))
+            coverage = self._coverage(overlap, weights, with_gap, nodal_map)
         else:
-            coverage = self._coverage(overlap, weights, like.with_gap, like.values)
-        rows, across, closer = self._weighted_integrals(coverage)
+            coverage = self._coverage(overlap, weights, earlier.with_gap, earlier.nodal_map)
+        D, M, gap_reduction = self._weighted_integrals(coverage)
         # The gap of an excluded node is omitted, but the functions of its neighbours are not extended over its area.
-        sums = np.where(self.excluded[self.secondary.points], 0.0, np.asarray(rows.sum(axis=1)).ravel())
+        sums = np.where(self.excluded[self.secondary.points], 0.0, np.asarray(D.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
-        mean = scaled(csr_array(rows - across), 1.0 / weight)
+        motion = scaled(csr_array(D - M), 1.0 / weight)
         normal = self._mean_normals(overlap, deformed, config.pose)
-        return Means(coverage, rows, across, weight, mean, closer / weight[:, None], normal)
+        return Means(coverage, D, M, weight, motion, gap_reduction / weight[:, None], normal)
 
     def _linearised(
         self, config: Configuration, means: Means, held: list[tuple[Array, Mask]], constraints: Constraints,
@@ -266,7 +267,7 @@ class WeightedMortar(Formulation):
 
         `constraints` and `slip_data` are the results of `_weighted_gaps` for the other arguments.
         """
-        if isinstance(self.primary, Surface) and (self.points.shape[1] == 3 or self._ends_within(config, multiplier)):
+        if self._needs_differences(config, multiplier):
 
             def constraints_after(motion: Array) -> Constraints:
                 moved = replace(config, displacement=config.displacement + motion)
@@ -275,18 +276,18 @@ class WeightedMortar(Formulation):
 
             sides = np.concatenate([self.secondary.points, self.primary.points])
             motions = displacement, displacement - config.start, displacement - config.displacement
-            step = DIFFERENCES**1.5 * float(np.ptp(self.points[sides], axis=0).max())
+            step = DIFFERENCE_STEP**1.5 * float(np.ptp(self.points[sides], axis=0).max())
             return Differences(constraints, constraints_after, (multiplier, tangential), motions, sides, step)
         config, deformed = replace(config, displacement=displacement), self.points + displacement
-        covers = [] if slip_data is None else [cover for _, cover in slip_data.substitutions]
-        linearised, functions = self._at_points(config, means, multiplier, covers)
+        coverages = [] if slip_data is None else [coverage for _, coverage in slip_data.substitutions]
+        linearised, functions = self._linearised_points_of_overlap(config, means, multiplier, coverages)
         if slip_data is None:
             return linearised
         slips = self._load_step_slips(means.motion, slip_data.tangents, tangential, config)
         is_rigid = isinstance(self.primary, RigidSide)
         symmetric = self.slip == "symmetric" and not is_rigid
-        if symmetric or covers:
-            opening = means.motion @ slips.start - means.closer
+        if symmetric or coverages:
+            opening = means.motion @ slips.start - means.gap_reduction
             secondary = None if is_rigid else NodalNormals(self.secondary, deformed)
             closing = Closing.of(means.normal, secondary, opening, slip_data.length)
             slips = replace(slips, total=slips.total + symmetric * closing.vector, closing=closing, symmetric=symmetric)
@@ -294,30 +295,35 @@ class WeightedMortar(Formulation):
                 slips = slips.with_substitution(replace(substitution, functions=weights), linearised.points.motion)
         return replace(linearised, slips=slips)
 
-    def _ends_within(self, config: Configuration, multiplier: Array) -> bool:
-        """Return whether the primary side, or that of one of its bodies, ends within facets that carry forces."""
-        assert isinstance(self.primary, Surface)
+    def _needs_differences(self, config: Configuration, multiplier: Array) -> bool:
+        """Return whether mean gaps are linearised by finite differences.
+
+        This is the case between two bodies in 3D, and in 2D if the primary side, or that of one of its bodies, ends within
+        facets that carry forces.
+        """
+        if isinstance(self.primary, RigidSide) or self.points.shape[1] == 3:
+            return isinstance(self.primary, Surface)
         deformed, tolerance = self.points + config.displacement, self.projection_tolerance or 0.0
         ends = ((b.local, facets_at_ends(b, self.primary, deformed, tolerance)) for b in self.secondary.blocks)
         return any(multiplier[local[facets]].any() for local, facets in ends)
 
-    def _at_points(
-        self, config: Configuration, means: Means, multiplier: Array, covers: Sequence[Coverage]
+    def _linearised_points_of_overlap(
+        self, config: Configuration, means: Means, multiplier: Array, substitutes: Sequence[Coverage]
     ) -> tuple[LinearisedPoints, list[csr_array]]:
-        """Return the linearisation of contact forces and mean gaps, with the projections of the integration points.
+        """Return the linearisation of contact forces and mean gaps at the integration points of the overlap.
 
-        The second result contains the weights of the points in `covers` minus those in `means`. The segments are kept
-        constant. The variation of a cut has no effect if the integrand is continuous across it, which is the case except at
-        ends of the primary side.
+        The second result contains the weights of the points in the coverages `substitutes` minus those in `means`. The
+        segments are kept constant. The variation of a cut has no effect if the integrand is continuous across it, which is
+        the case except at ends of the primary side.
         """
-        deformed, overlap, values = self.points + config.displacement, means.coverage.overlap, means.coverage.values
-        is_loaded, coverages = values @ multiplier != 0.0, (means.coverage, *covers)
+        deformed, (overlap, *_, nodal_map) = self.points + config.displacement, means.coverage
+        is_loaded, coverages = nodal_map @ multiplier != 0.0, (means.coverage, *substitutes)
         functions, tests, n_points, facet_offset = [list[Blocks]() for _ in coverages], list[Blocks](), 0, 0
         nodes, shapes, facets = [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, overlap.points, strict=True)
         for number, (block, T, quadrature_points) in enumerate(of_blocks):
             selected = is_loaded[block.local].any(axis=1)[quadrature_points.facet]
-            facet, shape, area = (values[selected] for values in quadrature_points)
+            facet, shape, area = (array[selected] for array in quadrature_points)
             columns = n_points + np.arange(len(facet))[:, None]
             local, weighted = block.local[facet], (area[:, None] * shape)[:, :, None]
             tests.append((local, columns, T @ weighted))
@@ -328,40 +334,42 @@ class WeightedMortar(Formulation):
             facets.append(facet_offset + facet)
             n_points, facet_offset = n_points + len(facet), facet_offset + len(block.facets)
         candidates = Candidates(padded(nodes), padded(shapes), np.concatenate(facets))
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", config.pose)
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        rise = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, deformed)
-        points = faced(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, rise)
-        weights, *others = (
-            scaled(csr_array(values.T @ assembled(entries, size)[:, rows]), 1.0 / means.weight) for entries in functions
-        )
+        slope = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, deformed)
+        points = paired_points(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, slope)
+        integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
+        weights, *substitute_weights = (scaled(matrix, 1.0 / means.weight) for matrix in integrals)
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
             all_nodes = np.arange(len(self.secondary.points))
-            separate_normals = faced(
-                self.at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose
-            )
+            arguments = self.primary, deformed, self.normals, config.pose
+            separate_normals = paired_points(self.node_candidates, pairing, all_nodes, *arguments)
         elif self.normals == "secondary":
             separate_normals = NodalNormals(self.secondary, deformed)
-        arguments = points, weights, means.normal, multiplier, mean, separate_normals
-        return LinearisedPoints(self.secondary, *arguments), [csr_array(other - weights) for other in others]
+        linearised = points, weights, means.normal, multiplier, mean, separate_normals
+        differences = [csr_array(substitute - weights) for substitute in substitute_weights]
+        return LinearisedPoints(self.secondary, *linearised), differences
 
     @cached_property
-    def _whole_side(self) -> tuple[Array, Array, list[Any], Mask]:
-        """The attributes of `WeightedPressures` that are the same in all pairings."""
-        full_area, quadratic = nodal_areas(self.secondary, self.points, self.axisymmetric), []
-        full_areas, held = np.zeros_like(full_area), np.zeros(len(full_area), bool)
-        for block, T, full in zip(self.secondary.blocks, self._test, self._whole, strict=True):
+    def _constant_attributes(self) -> tuple[Array, Array, list[Any], Mask]:
+        """The attributes of `WeightedPressures` that are the same in all pairings.
+
+        The first ones are `full_areas` if all nodal values of the multiplier field are independent.
+        """
+        areas, quadratic = nodal_areas(self.secondary, self.points, self.axisymmetric), []
+        full_areas, held = np.zeros_like(areas), np.zeros(len(areas), bool)
+        for block, T, full in zip(self.secondary.blocks, self._test, self._full_weights, strict=True):
             np.add.at(full_areas, block.local, full)
             element = elements.get(block.element)
             if element.order == 2:
                 quadratic.append((element.n_corners, T, block.local))
-        if self.held is not None and isinstance(self.primary, RigidSide):
-            projectors = self.held.at(self.secondary.points)
+        if self.held_motions is not None and isinstance(self.primary, RigidSide):
+            projectors = self.held_motions.projectors_at(self.secondary.points)
             held = np.trace(projectors, axis1=1, axis2=2) > self.points.shape[1] - 0.5
-        return full_areas, full_area, quadratic, held
+        return full_areas, areas, quadratic, held
 
     def _closing_motion(self, constraints: Constraints, normal: Array, config: Configuration) -> tuple[Array, Array]:
         """Return the lengths (m,) by which gaps close in the step [length], and the directions (m, dim) of this motion.
@@ -373,68 +381,68 @@ class WeightedMortar(Formulation):
         if not isinstance(self.primary, RigidSide):
             direction = normal - nodal_normals(self.secondary, self.points + config.displacement)
             direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
-        lean = np.einsum("nd,nd->n", normal, direction)
-        gap = np.where(constraints.usable & (lean > 0.0), constraints.gaps(config.start), 0.0)
-        return gap / np.where(lean > 0.0, lean, 1.0), direction
+        cosine = np.einsum("nd,nd->n", normal, direction)
+        gap = np.where(constraints.usable & (cosine > 0.0), constraints.gaps(config.start), 0.0)
+        return gap / np.where(cosine > 0.0, cosine, 1.0), direction
 
     def _slips(
-        self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], coverage: Coverage, mean: csr_array,
-        base: csr_array, weight: Array,
-    ) -> tuple[tuple[csr_array, ...], list[tuple[Substitution, Coverage]]]:  # fmt: skip
+        self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], means: Means
+    ) -> tuple[tuple[csr_array, ...], list[tuple[Substitution, Coverage]]]:
         """Return the rows (m, n_dofs) of the slips along tangents (m, dim), and the additional slips in held directions.
 
-        Usually the rows are those of the `mean` relative motion. If both sides are held at a node in a direction, as in a
+        Usually the rows are those of the mean relative motion. If both sides are held at a node in a direction, as in a
         plane of symmetry, the mean in this direction would contain only the motion of the other side near the plane. The
-        functions of neighbouring nodes then replace that of the node, see `Formulation.without_slip`. The coverage with these
-        functions follows each `Substitution`.
+        functions of neighbouring nodes then replace that of the node. `without_slip` are the directions and nodes
+        `Formulation.directions_without_slip`. The coverage with these functions follows each `Substitution`.
         """
-        rows, substitutions = [rows_of(mean, direction) for direction in directions], []
+        coverage, D, _, weight, motion, *_ = means
+        rows, substitutions = [rows_of(motion, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
         for axis, nodes in without_slip:
             if not (nodes & coverage.with_gap).any():
                 continue
-            cover = self._coverage(*coverage[:2], coverage.with_gap & ~nodes, coverage.values)
-            substitute, across, _ = self._weighted_integrals(cover)
-            difference = csr_array(scaled(csr_array(substitute - across), 1.0 / weight) - mean)
+            substitute = self._coverage(*coverage[:2], coverage.with_gap & ~nodes, coverage.nodal_map)
+            D_substitute, M_substitute, _ = self._weighted_integrals(substitute)
+            difference = csr_array(scaled(csr_array(D_substitute - M_substitute), 1.0 / weight) - motion)
             difference.eliminate_zeros()
             for k, direction in enumerate(directions):
-                slip = np.einsum("md,md->m", direction, axis)
-                rows[k] = csr_array(rows[k] + rows_of(difference, slip[:, None] * axis))
-            secondary = csr_array(scaled(csr_array(substitute - base), 1.0 / weight)[:, self.secondary.points])
-            substitutions.append((Substitution(axis, nodes, secondary, difference), cover))
+                cosine = np.einsum("md,md->m", direction, axis)
+                rows[k] = csr_array(rows[k] + rows_of(difference, cosine[:, None] * axis))
+            secondary = csr_array(scaled(csr_array(D_substitute - D), 1.0 / weight)[:, self.secondary.points])
+            substitutions.append((Substitution(axis, nodes, secondary, difference), substitute))
             held[nodes] += np.einsum("md,me->mde", axis[nodes], axis[nodes])
-        # Slip is computed along tangents whose component that supports do not hold is longer than FACING.
-        free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FACING**2 for t in directions]
-        rows = [scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)]
+        # Slip is computed only along tangents whose component that supports do not hold is longer than FACING.
+        is_free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FACING**2 for t in directions]
+        rows = [scaled(matrix, np.where(can_slip, 1.0, 0.0)) for matrix, can_slip in zip(rows, is_free, strict=True)]
         return tuple(rows), substitutions
 
     def _weighted_integrals(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
-        """Return the integrals of psi times the secondary and times the primary shape functions, (m, n_points) each [area].
+        """Return the mortar matrices D and M (m, n_points) [area], and the integrals of the gap reductions.
 
-        The third result contains the integrals (m, dim) of psi times the vectors by which the smooth surfaces are closer to
-        each other than the facets [volume].
+        The latter are the integrals (m, dim) of psi times the vectors of `Overlap.gap_reductions` [volume].
         """
         overlap = coverage.overlap
         size = (len(self.secondary.points), len(self.points))
-        rows, across, functions = list[Blocks](), list[Blocks](), {}
-        closer = np.zeros((size[0], self.points.shape[1]))
-        of_blocks = zip(self.secondary.blocks, coverage.functions, overlap.closer, strict=True)
-        for block, (psi, products), depth in of_blocks:
-            rows.append((block.local, block.facets, products))
+        D_blocks, M_blocks, functions = list[Blocks](), list[Blocks](), {}
+        gap_reduction = np.zeros((size[0], self.points.shape[1]))
+        of_blocks = zip(self.secondary.blocks, coverage.functions, overlap.gap_reductions, strict=True)
+        for block, (psi, products), integrals in of_blocks:
+            D_blocks.append((block.local, block.facets, products))
             functions[block.element] = psi
-            np.add.at(closer, block.local, psi @ depth)
+            np.add.at(gap_reduction, block.local, psi @ integrals)
         for coupling in overlap.couplings:
             secondary_facet, primary_facet = coupling.pairs.T
             values = functions[coupling.secondary.element][secondary_facet] @ coupling.integrals
-            across.append((coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values))
-        if (values := coverage.values).diagonal().all():
-            return assembled(rows, size), assembled(across, size), closer
-        on_independent = csr_array(values.T)
-        return on_independent @ assembled(rows, size), on_independent @ assembled(across, size), on_independent @ closer
+            M_blocks.append((coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values))
+        D, M = assembled(D_blocks, size), assembled(M_blocks, size)
+        if coverage.nodal_map.diagonal().all():
+            return D, M, gap_reduction
+        to_independent = csr_array(coverage.nodal_map.T)
+        return to_independent @ D, to_independent @ M, to_independent @ gap_reduction
 
-    def _coverage(self, overlap: Overlap, weights: list[Array], with_gap: Mask, values: csr_array) -> Coverage:
-        """Return the coverage with the functions psi of the nodes `with_gap` (m,), and a multiplier field with `values`."""
-        functions, of_blocks = [], zip(self._test, overlap.mass, weights, self._whole, strict=True)
+    def _coverage(self, overlap: Overlap, weights: list[Array], with_gap: Mask, nodal_map: csr_array) -> Coverage:
+        """Return the coverage with the functions psi of the nodes `with_gap` (m,) and the `nodal_map` of the multipliers."""
+        functions, of_blocks = [], zip(self._test, overlap.mass, weights, self._full_weights, strict=True)
         for block, (T, mass, covered, full) in zip(self.secondary.blocks, of_blocks, strict=True):
             with_psi = with_gap[block.local]
             if self.multipliers == "standard":
@@ -444,16 +452,16 @@ class WeightedMortar(Formulation):
                 fraction = np.divide(covered, full, out=np.zeros_like(covered), where=full > 0.0)
                 psi, D = dual_functions(T @ mass @ T.T, with_psi, fraction)
                 functions.append((psi @ T, D @ np.linalg.inv(T).T))
-        return Coverage(overlap, weights, with_gap, functions, values)
+        return Coverage(overlap, weights, with_gap, functions, nodal_map)
 
-    def _values(self, with_gap: Mask, held: Mask) -> csr_array:
+    def _nodal_map(self, with_gap: Mask, held: Mask) -> csr_array:
         """Return the map (m, m) from independent to nodal values of the multiplier field.
 
-        The value at a node in `held` (m,) is the mean over those nodes in `with_gap` (m,) of its facets that are not held.
-        If there are none, it is independent.
+        The value at a node in `held` (m,) is the weighted mean over those nodes in `with_gap` (m,) of its facets that are not
+        held. If there are none, it is independent.
         """
         entries = []
-        for block, full in zip(self.secondary.blocks, self._whole, strict=True) if held.any() else ():
+        for block, full in zip(self.secondary.blocks, self._full_weights, strict=True) if held.any() else ():
             independent = (with_gap & ~held)[block.local] & (full > 0.0)
             means = independent / np.maximum(independent.sum(axis=1), 1)[:, None]
             held_areas = np.where(held[block.local], full, 0.0)
@@ -463,21 +471,22 @@ class WeightedMortar(Formulation):
         sums = scaled(sums, 1.0 / np.where(total > 0.0, total, 1.0))
         return csr_array(diags_array(np.where(total > 0.0, 0.0, 1.0)) + sums)
 
-    def _nodes_with_gaps(self, covered: list[Array], least: float) -> Mask:
-        """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions over the overlap.
+    def _nodes_with_gaps(self, weights: list[Array], smallest_fraction: float) -> Mask:
+        """Return which nodes (m,) have gaps, given the `Coverage.weights` of all test functions.
 
-        With dual functions, a node has a gap if its weight is more than the fraction `least` of that over complete facets.
+        With dual functions, a node has a gap if its weight is more than `smallest_fraction` of that over complete facets.
         """
         m = len(self.secondary.points)
         total, full_total, additional = np.zeros(m), np.zeros(m), np.zeros(m, bool)
-        for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
-            np.add.at(total, block.local, weights)
+        for block, covered, full in zip(self.secondary.blocks, weights, self._full_weights, strict=True):
+            np.add.at(total, block.local, covered)
             np.add.at(full_total, block.local, full)
-        sufficient = total > (least if self.multipliers == "dual" else NO_AREA) * full_total
-        for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
+        sufficient = total > (smallest_fraction if self.multipliers == "dual" else NEGLIGIBLE_AREA) * full_total
+        for block, covered, full in zip(self.secondary.blocks, weights, self._full_weights, strict=True):
             # If no node of a facet has a sufficient weight, the node with the largest weight has a gap, so that no overlap
             # is omitted.
-            without_gap = ~sufficient[block.local].any(axis=1) & (weights.sum(axis=1) > NO_AREA * full.sum(axis=1))
+            is_covered = covered.sum(axis=1) > NEGLIGIBLE_AREA * full.sum(axis=1)
+            without_gap = ~sufficient[block.local].any(axis=1) & is_covered
             largest = np.argmax(total[block.local[without_gap]], axis=1)
             additional[block.local[without_gap][np.arange(len(largest)), largest]] = True
         return (sufficient | additional) & (full_total > 0.0)
@@ -485,7 +494,8 @@ class WeightedMortar(Formulation):
     def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
         """Return unit means (m, dim) of the opposite primary normals; at unpaired nodes, the mean over all nodes.
 
-        Against an obstacle they are the normals at the nodes themselves, which lie in planes of symmetry of the model.
+        Against an obstacle they are the normals opposite the nodes themselves, which lie in the planes of symmetry of the
+        model.
         """
         if isinstance(self.primary, RigidSide):
             _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], pose)
@@ -511,11 +521,11 @@ class WeightedMortar(Formulation):
         mean = np.where(length > 0.0, mean, overall)
         return mean / np.linalg.norm(mean, axis=1, keepdims=True)
 
-    def _clearance(self, rows: csr_array, across: csr_array, weight: Array) -> Array:
+    def _clearance(self, D: csr_array, M: csr_array, weight: Array) -> Array:
         """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""
-        contribution = np.zeros(rows.shape[0])
+        contribution = np.zeros(len(weight))
         for matrix, side, clearance in (
-            (rows, self.secondary, self.options.clearance), (across, self.primary, self.options.clearance_primary)
+            (D, self.secondary, self.options.clearance), (M, self.primary, self.options.clearance_primary)
         ):  # fmt: skip
             if clearance is not None:
                 values = np.zeros(len(self.points))
@@ -532,21 +542,21 @@ class WeightedPressures(NodalField):
     ----------
     weight : ndarray (m,)
         Area of each gap, infinite where there is no gap [area].
-    values : csr_array (m, m)
+    nodal_map : csr_array (m, m)
         Map from independent to nodal values of the multiplier field [-].
     full_areas : ndarray (m,)
-        Integrals of the functions of the independent values over the complete secondary side [area].
+        Integrals of the test functions of the independent values over the complete secondary side [area].
     nodal_areas : ndarray (m,)
         Integrals of the shape functions over the complete secondary side [area].
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
-        For each block of quadratic facets, the number of corners, the coefficients of the positive functions in terms of the
-        shape functions, and the nodes of the facets.
+        For each block of quadratic facets, the number of corners, the coefficients of the test functions in terms of the
+        shape functions [-], and the nodes of the facets, numbered on the side.
     held : ndarray of bool (m,)
         Nodes that are prescribed in all directions. Their forces act between supports, independently of their neighbours.
     """
 
     weight: Array
-    values: csr_array
+    nodal_map: csr_array
     full_areas: Array
     nodal_areas: Array
     quadratic: list[tuple[int, Array, NDArray[np.signedinteger]]]
@@ -564,8 +574,8 @@ class WeightedPressures(NodalField):
         fraction = np.divide(self.weight, self.full_areas, out=np.zeros_like(self.weight), where=has_area)
         return self._at_nodes(fraction, only_without_gap=True)
 
-    def over_whole_side(self, force: Array) -> Array:
-        """Return the forces divided by the complete areas of the positive functions; see `_at_nodes`.
+    def side_pressure(self, force: Array) -> Array:
+        """Return the forces divided by the complete areas of the test functions; see `_at_nodes`.
 
         The covered part of the area of a node may be arbitrarily small, and the force vanishes with it. The ratio of the
         force and the covered area is sensitive to round-off, unlike the force divided by the complete area.
@@ -573,24 +583,22 @@ class WeightedPressures(NodalField):
         return self._at_nodes(np.divide(force, self.full_areas, out=np.zeros_like(force), where=self.full_areas > 0.0))
 
     def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
-        """Return the nodal values (m,) of a field with `coefficients` (m,) of the positive functions.
+        """Return the nodal values (m,) of a field with `coefficients` (m,) of the test functions.
 
         They are the coefficients themselves, except at mid-side nodes of quadratic facets, where the functions of the corners
-        do not vanish.
+        do not vanish. With `only_without_gap`, they are also the coefficients at mid-side nodes that have gaps.
         """
-        coefficients = self.values @ coefficients
+        coefficients = self.nodal_map @ coefficients
         values = coefficients.copy()
         for corners, T, local in self.quadratic:
             with_gaps = T[corners:].any()
             if only_without_gap and with_gaps:
                 continue
-            at_mid_nodes = coefficients[local[:, corners:]]
-            values[local[:, corners:]] = coefficients[local] @ T[:, corners:]
+            middles, T_middles = local[:, corners:], T[:, corners:]
+            values[middles] = coefficients[local] @ T_middles
             if with_gaps and self.held.any():
                 held = self.held[local]
-                values[local[:, corners:]] += (held @ T[:, corners:]) * at_mid_nodes - (held * coefficients[local]) @ T[
-                    :, corners:
-                ]
+                values[middles] += (held @ T_middles) * coefficients[middles] - (held * coefficients[local]) @ T_middles
         return values
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:

@@ -17,7 +17,8 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import (
-    all_nodes_carry,
+    NEGLIGIBLE_AREA,
+    all_nodes_carry_pressure,
     areas_of_rule,
     even_at_axis,
     facet_measure,
@@ -69,24 +70,24 @@ class Continuous(PressureFieldFormulation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        local, areas, rules, shortest = [], [], [], np.inf
+        local, areas, rules, smallest_size = [], [], [], np.inf
         for block in self.secondary.blocks:
             xi, weights = self._rule(block.element)
             local.append(np.repeat(block.local, len(xi), axis=0))
             areas.append(self._areas(block, xi, weights))
             rules.append(xi)
             size = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
-            shortest = min(shortest, size.min() ** (1 / xi.shape[1]))
+            smallest_size = min(smallest_size, size.min() ** (1 / xi.shape[1]))
         self._candidates = Candidates.inside(self.secondary, rules)
-        rho = self.augmentation * self.modulus / shortest
-        all_areas = np.concatenate(areas)
-        areas_of_points = np.where(self._candidates.belonging_to(self.excluded), 0.0, all_areas)
+        rho = self.augmentation * self.modulus / smallest_size
+        full_areas = np.concatenate(areas)
+        usable_areas = np.where(self._candidates.belonging_to(self.excluded), 0.0, full_areas)
         nodes = padded(local)
         P = shapes_at(self._candidates.shape, nodes, len(self.secondary.points))
-        field = self.repeated(self._independent_values(P, areas_of_points))
-        points, areas_of_all = (nodes, self._candidates.shape), (areas_of_points, all_areas)
-        kind = {"renewed": False, "eliminable": self.eliminable, "quadratic": self.secondary.order > 1}
-        self._field = PressureField.of_points(points, areas_of_all, float(rho), field, **kind)
+        field = self.with_common_values(self._independent_values(P, usable_areas))
+        points = nodes, self._candidates.shape
+        flags = {"has_new_points": False, "eliminable": self.eliminable, "quadratic": self.secondary.order > 1}
+        self._field = PressureField.of_points(points, (usable_areas, full_areas), float(rho), field, **flags)
 
     def _rule(self, element: str) -> quadrature.Rule:
         """Return the integration points and weights on the reference facet of an element type."""
@@ -127,20 +128,19 @@ class Continuous(PressureFieldFormulation):
         N, measure = areas_of_rule(block, self.points, self.axisymmetric)
         areas = measure @ N
         if block.element == "line3":  # at the axis the integral vanishes, except for the curvature of the facet
-            areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
+            areas[np.abs(areas) < NEGLIGIBLE_AREA * areas[:, 2:]] = 0.0
         return areas.ravel()
 
     def _independent_values(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
-        """Return the matrix (n_nodes, k) from the independent values of the field to all nodal values, and their nodes (k,).
+        """Return the map (n_nodes, k) from independent to nodal values of the field, and the nodes (k,) of the former.
 
         All nodal values are independent, except at nodes without area, at excluded nodes, and with friction at ends of
         quadratic lines on the axis, see `integration.even_at_axis`. Without friction, the value on the axis is independent,
         as in code_aster, and deviates by a few percent from the even continuation of the field.
         """
-        size = P.shape[1]
         weight = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
         excluded = self.dependent_nodes(Configuration.undeformed(self.points))
-        even = even_at_axis(self.secondary, self.points) if self.axisymmetric else csr_array(eye_array(size))
+        even = even_at_axis(self.secondary, self.points) if self.axisymmetric else csr_array(eye_array(P.shape[1]))
         if not self.friction:
             has_weight = (weight != 0.0).astype(float)
             even = csr_array(diags_array(has_weight) + diags_array(1.0 - has_weight) @ even)
@@ -154,7 +154,7 @@ class Continuous(PressureFieldFormulation):
         areas = self._field.projection.areas
         at_axis = self._at_axis
         pairing.paired[~(areas > ROUND_OFF * areas.max()) & ~at_axis] = False
-        constraints = self.of_points(self._candidates, pairing, self._field, config)
+        constraints = self.constraints_of_points(self._candidates, pairing, self._field, config)
         if at_axis.any():  # There is no slip on the axis.
             constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
         return constraints
@@ -183,7 +183,7 @@ def _simpson(element: str) -> quadrature.Rule:
         closed = quadrature.triangle_7_closed()
         return closed if reference.order == 1 else quadrature.quartered_triangle(closed)
     line = quadrature.subdivided(quadrature.simpson_line(), reference.order)
-    return line if reference.dim == 1 else quadrature.square(line)
+    return line if reference.dim == 1 else quadrature.tensor_product(line, line)
 
 
 def _at_nodes(element: str) -> quadrature.Rule:
@@ -191,7 +191,7 @@ def _at_nodes(element: str) -> quadrature.Rule:
     reference = elements.get(element)
     xi, weights = fine_rule(element)
     areas = weights @ reference.shape(xi)
-    if not all_nodes_carry(element):
+    if not all_nodes_carry_pressure(element):
         raise ContactError(
             f"integration = 'node' makes no sense on facets of {element}: their corners have no positive area. Use "
             "'gauss' or 'simpson'"

@@ -36,7 +36,7 @@ from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
-from fastcontact.contact.integration import NO_AREA, areas_of_rule, facet_measure
+from fastcontact.contact.integration import NEGLIGIBLE_AREA, areas_of_rule, facet_measure
 from fastcontact.contact.pair_options import nodal_map
 from fastcontact.contact.pairing import Candidates, Normals
 from fastcontact.contact.surface import FacetBlock, Surface
@@ -46,7 +46,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 # Smallest generalised eigenvalue at which a field counts as determined. For a linear field about a seventh of the length of
 # a line must be covered, for a quadratic field two fifths. Errors at the other end are then amplified by at most 30.
-DETERMINED = 1e-3
+SMALLEST_EIGENVALUE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,9 @@ class CompleteFacets:
         size = np.einsum("fkk->f", self.mass)
         partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > SINGLE_PRECISION * size))
         full, partial, T = self.mass[partly], mass[partly], self.to_corners
-        linear = _smallest_eigenvalues(T @ full @ T.T, T @ partial @ T.T) > DETERMINED
-        degrees[partly] = np.where(_smallest_eigenvalues(full, partial) > DETERMINED, 2, np.where(linear, 1, 0))
+        linear = _smallest_eigenvalues(T @ full @ T.T, T @ partial @ T.T) > SMALLEST_EIGENVALUE
+        complete = _smallest_eigenvalues(full, partial) > SMALLEST_EIGENVALUE
+        degrees[partly] = np.where(complete, 2, np.where(linear, 1, 0))
         return degrees
 
 
@@ -118,34 +119,34 @@ def independent_values(side: Surface, field: CompleteFacets, mass: Array, exclud
     nodes : ndarray of int (k,)
         Node of each independent value.
     """
-    degree, local, chosen = field.degrees(mass), field.block.local, np.zeros(len(side.points), bool)
-    chosen[local[degree == 2]] = True
-    chosen[local[degree == 1][:, : len(field.to_corners)]] = True
-    chosen &= ~excluded
+    degree, local, is_independent = field.degrees(mass), field.block.local, np.zeros(len(side.points), bool)
+    is_independent[local[degree == 2]] = True
+    is_independent[local[degree == 1][:, : len(field.to_corners)]] = True
+    is_independent &= ~excluded
     # In a facet without an independent node, the node with the largest covered area becomes independent.
-    for facet in np.flatnonzero((degree >= 0) & ~chosen[local].any(axis=1)):
+    for facet in np.flatnonzero((degree >= 0) & ~is_independent[local].any(axis=1)):
         nodes = local[facet]
-        if not (chosen[nodes].any() or excluded[nodes].all()):
-            chosen[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
-    independent = np.flatnonzero(chosen)
-    values = nodal_map(side, excluded, independent) if excluded.any() else csr_array(diags_array(chosen.astype(float)))
+        if not (is_independent[nodes].any() or excluded[nodes].all()):
+            is_independent[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
+    independent = np.flatnonzero(is_independent)
+    values = nodal_map(side, excluded, independent)
     if (degree[degree >= 0] < 2).any():
-        values = _with_interpolated_rows(csr_array(values), field, local[degree >= 0], chosen, excluded)
-    return csr_array(csr_array(values)[:, independent]), independent
+        values = _with_interpolated_rows(values, field, local[degree >= 0], is_independent, excluded)
+    return csr_array(values[:, independent]), independent
 
 
 def _with_interpolated_rows(
-    values: csr_array, field: CompleteFacets, local: Indices, with_value: Mask, excluded: Mask
+    values: csr_array, field: CompleteFacets, local: Indices, is_independent: Mask, excluded: Mask
 ) -> csr_array:
     """Return the map `values` (m, m) with rows added for nodes that are neither independent nor excluded.
 
     The value at a corner is the mean of those at the independent nodes of its facets. The values at other nodes are
     interpolated linearly between the corners. `local` (n, k) are the nodes of the facets that are at least partly covered.
     """
-    m, has_value = len(with_value), with_value | excluded
+    m, has_value = len(is_independent), is_independent | excluded
     corners = local[:, : len(field.to_corners)]
     row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
-    selected = ~has_value[row] & with_value[column]
+    selected = ~has_value[row] & is_independent[column]
     row, column = np.unique(np.column_stack([row[selected], column[selected]]), axis=0).T
     count = np.bincount(row, minlength=m)
     values = csr_array(diags_array(has_value.astype(float)) @ values)
@@ -176,7 +177,7 @@ class SegmentMortar(PressureFieldFormulation):
     multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
-    against_obstacles: ClassVar[bool] = False
+    allows_obstacles: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -185,7 +186,7 @@ class SegmentMortar(PressureFieldFormulation):
         block, (xi, weights) = self.secondary.only_block, quadrature.gauss_line(3)
         lengths = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
         self._borders = _excluded_borders(block, self.excluded)
-        self._whole = CompleteFacets.of(block, self.points, self.axisymmetric)
+        self._complete_facets = CompleteFacets.of(block, self.points, self.axisymmetric)
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     @classmethod
@@ -208,17 +209,18 @@ class SegmentMortar(PressureFieldFormulation):
         paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
-        usable = paired & (covered > NO_AREA * total)[facet] & (area > 0)
+        usable = paired & (covered > NEGLIGIBLE_AREA * total)[facet] & (area > 0)
         if self.excluded.any():
             usable &= ~candidates.belonging_to(self.excluded)
         pairing = replace(pairing_of_points, paired=usable)
         usable_area, (n, k) = np.where(usable, area, 0.0), block.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        values = self.repeated(independent_values(self.secondary, self._whole, mass, self.dependent_nodes(config)))
-        samples = block.local[facet], shape
-        field = PressureField.of_points(samples, (usable_area, area), self._rho, values, renewed=True)
-        return self.of_points(candidates, pairing, field, config)
+        dependent = self.dependent_nodes(config)
+        values = self.with_common_values(independent_values(self.secondary, self._complete_facets, mass, dependent))
+        points_and_areas = (block.local[facet], shape), (usable_area, area)
+        field = PressureField.of_points(*points_and_areas, self._rho, values, has_new_points=True)
+        return self.constraints_of_points(candidates, pairing, field, config)
 
 
 def _excluded_borders(block: FacetBlock, excluded: Mask) -> tuple[Indices, Array]:

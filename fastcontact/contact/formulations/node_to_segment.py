@@ -24,7 +24,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.integration import all_nodes_carry, even_at_axis, mass_matrix, nodal_areas
+from fastcontact.contact.integration import all_nodes_carry_pressure, even_at_axis, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, Pairing
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
@@ -57,12 +57,13 @@ class NodeToSegment(Formulation):
             raise ContactError("a rigid obstacle has no nodes: leave out opposite = 'node'")
         for block in self.secondary.blocks:
             # A uniform pressure on a facet must have compressive forces at all nodes.
-            if not all_nodes_carry(block.element):
-                other = self.primary.blocks if isinstance(self.primary, Surface) else ()
-                swap = ", or swap the sides" if other and all(all_nodes_carry(block.element) for block in other) else ""
+            if not all_nodes_carry_pressure(block.element):
+                primary_blocks = self.primary.blocks if isinstance(self.primary, Surface) else ()
+                can_swap = primary_blocks and all(all_nodes_carry_pressure(b.element) for b in primary_blocks)
+                advice = ", or swap the sides" if can_swap else ""
                 raise ContactError(
                     f"node_to_segment cannot have facets of {block.element} on its secondary side '{self.secondary.group}', "
-                    f"whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar'{swap}"
+                    f"whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar'{advice}"
                 )
 
     def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
@@ -72,35 +73,37 @@ class NodeToSegment(Formulation):
             return pairing
         assert isinstance(self.primary, Surface)
         deformed, nodes = self.points + config.displacement, Candidates.nodes_of(self.primary)
-        rows = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
+        closest = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
-            normal = nodal_normals(self.primary, deformed)[rows]
+            normal = nodal_normals(self.primary, deformed)[closest]
         assert nodes.facet is not None
         assert nodes.xi is not None
-        return replace(pairing, facet=nodes.facet[rows], xi=nodes.xi[rows], normal=normal, beyond=None)
+        return replace(pairing, facet=nodes.facet[closest], xi=nodes.xi[closest], normal=normal, beyond=None)
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
-        pairing = self.facing(self.at_nodes, config)
+        pairing = self.facing(self.node_candidates, config)
         pairing.paired[self.excluded[self.secondary.points]] = False
-        areas = self._nodal.nodal_areas
-        usable = np.where(areas > ROUND_OFF * areas.max(), areas, np.inf)
-        constraints = self.assembled(self.at_nodes, pairing, None, config)
+        nodal_areas = self._nodal_forces.nodal_areas
+        areas = np.where(nodal_areas > ROUND_OFF * nodal_areas.max(), nodal_areas, np.inf)
+        nodes = self.secondary.points.astype(np.intp)
+        constraints = self.assembled(self.node_candidates, pairing, None, config)
         if self.opposite == "node":
             constraints = replace(constraints, geometry=None)
-        return replace(constraints, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)
+        return replace(constraints, areas=areas, nodes=nodes, nodal=self._nodal_forces)
 
     @cached_property
-    def _nodal(self) -> NodalForces:
+    def _nodal_forces(self) -> NodalForces:
+        """The map from the nodal forces of the secondary side to its nodal pressures."""
         areas = nodal_areas(self.secondary, self.points, self.axisymmetric)
         if self.secondary.order == 1:
             return NodalForces(areas)
         even = even_at_axis(self.secondary, self.points) if self.axisymmetric else csr_array(eye_array(len(areas)))
-        nodes = np.flatnonzero(even.diagonal())
-        values = csr_array(even[:, nodes])
+        independent = np.flatnonzero(even.diagonal())
+        to_nodes = csr_array(even[:, independent])
         mass = mass_matrix(self.secondary, self.points, self.axisymmetric)
-        return NodalForces(areas, values, nodes, splu((values.T @ mass @ values).tocsc()))
+        return NodalForces(areas, to_nodes, independent, splu((to_nodes.T @ mass @ to_nodes).tocsc()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,18 +114,18 @@ class NodalForces(NodalField):
     ----------
     nodal_areas : ndarray (n_nodes,)
         Integrals of the shape functions of the nodes [area].
-    values : csr_array (n_nodes, k), optional
+    to_nodes : csr_array (n_nodes, k), optional
         For quadratic facets, map from the k independent nodal pressures to all nodal pressures; see
         `integration.even_at_axis`.
     independent : ndarray of int (k,), optional
         Nodes of the independent pressures.
     mass : SuperLU, optional
-        Factors of the mass matrix (k, k) of the independent pressures [area]. On quadratic facets, forces divided by nodal
-        areas are not the nodal values of a field.
+        Factorised mass matrix (k, k) of the independent pressures [area]. On quadratic facets, forces divided by nodal areas
+        are not the nodal values of a pressure field.
     """
 
     nodal_areas: Array
-    values: csr_array | None = None
+    to_nodes: csr_array | None = None
     independent: Indices | None = None
     mass: SuperLU | None = None
 
@@ -131,19 +134,19 @@ class NodalForces(NodalField):
 
         They are the forces divided by the nodal areas or, for quadratic facets, the solution with the mass matrix.
         """
-        if self.values is None or self.mass is None:
+        if self.to_nodes is None or self.mass is None:
             return force / self.nodal_areas
-        return np.asarray(self.values @ self.mass.solve(self.values.T @ force))
+        return np.asarray(self.to_nodes @ self.mass.solve(self.to_nodes.T @ force))
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the active nodes, and ends of quadratic lines on the axis if the other nodes of their facets are active.
 
         The force of such an end vanishes, and in equilibrium its gap may be slightly open.
         """
-        if self.values is None:
+        if self.to_nodes is None:
             return active
-        depends_on_others = self.values.indptr[1:] - self.values.indptr[:-1] > 1
-        inactive_weight = abs(self.values) @ (~active[self.independent]).astype(float)
+        depends_on_others = self.to_nodes.indptr[1:] - self.to_nodes.indptr[:-1] > 1
+        inactive_weight = abs(self.to_nodes) @ (~active[self.independent]).astype(float)
         return active | (depends_on_others & (inactive_weight == 0.0))
 
 

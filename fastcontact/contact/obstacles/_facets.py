@@ -31,8 +31,8 @@ class SurfaceFacets(NamedTuple):
 
     side: Surface
     normals: Array  # (n_facets, k, dim): unit normals at the nodes [-]
-    smooth: Array  # (n_facets, k, dim): the same, of the smooth surface [-]
-    at_nodes: Array  # (m, dim): normals of the nodes of the side, the means over all facets [-]
+    smooth_normals: Array  # (n_facets, k, dim): the same, of the smooth surface [-]
+    nodal_normals: Array  # (m, dim): unit normals of the nodes of the side, the means over all facets [-]
     on_border: Mask  # (m,): whether the surface ends at the node
 
 
@@ -43,8 +43,8 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
     form an orientable surface.
     """
     side, numbers = _oriented(mesh, group, flip)
-    normals, smooth = normals_at_nodes(side, mesh.points), smooth_normals(side, mesh.points, crease)
-    return SurfaceFacets(side, normals, smooth, nodal_normals(side, mesh.points), _border(mesh, side, numbers))
+    normals, smoothed = normals_at_nodes(side, mesh.points), smooth_normals(side, mesh.points, crease)
+    return SurfaceFacets(side, normals, smoothed, nodal_normals(side, mesh.points), _border(mesh, side, numbers))
 
 
 def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:

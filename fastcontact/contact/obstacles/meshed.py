@@ -12,11 +12,11 @@ from fastcontact.contact.obstacles._facets import SurfaceFacets, surface_facets
 from fastcontact.contact.projection import (
     SMALL_OVERHANG,
     Closest,
-    closest_of_kinds,
+    closest_of_types,
     distance_from_edges,
+    facet_points,
     facets_containing,
     interpolate,
-    places,
 )
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
@@ -98,18 +98,18 @@ class MeshedSurface:
                 f"the rigid surface '{self.group}' has {dim} dimensions, but the model {points.shape[1]}"
             )
         nodes_by_type = self._facets.side.node_positions(self.mesh.points)
-        closest = closest_of_kinds(points, nodes_by_type)
-        pseudonormal, smooth, on_edge, on_border = self._closest_normals(closest)
+        closest = closest_of_types(points, nodes_by_type)
+        pseudonormal, averaged, on_edge, on_border = self._closest_normals(closest)
         offset = points - closest.position
         size = np.concatenate([np.linalg.norm(np.ptp(x, axis=1), axis=1) for x in nodes_by_type])[closest.facet]
         # At touching points, the direction from the closest point is dominated by round-off, and the facet normal is used.
         is_touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
-        normal = smooth if self.crease else np.where(on_edge[:, None], smooth, closest.normal)
+        normal = averaged if self.crease else np.where(on_edge[:, None], averaged, closest.normal)
         pseudonormal /= np.linalg.norm(pseudonormal, axis=1, keepdims=True)
         # Next to a sharp edge the normal has the direction from the closest point to the point, not that of a facet normal.
-        sharp = np.einsum("nd,nd->n", pseudonormal, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
+        sharp = np.einsum("nd,nd->n", pseudonormal, averaged) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
         is_corrected = on_edge & sharp & ~is_touching
         normal[is_corrected] = offset[is_corrected] / distance[is_corrected, None]
         height = np.abs(np.einsum("nd,nd->n", offset, pseudonormal))
@@ -127,16 +127,18 @@ class MeshedSurface:
         of the adjacent facets on an edge, and the angle-weighted mean normal of all facets at a corner (Baerentzen and
         Aanaes, 2005).
         """
-        (side, normals, smooth, at_nodes, border), (facet, xi) = self._facets, closest[:2]
-        at, on_edge = places(side, facet, xi), distance_from_edges(side, facet, xi) <= ROUND_OFF
-        node = at.local[np.arange(len(facet)), at.shape.argmax(axis=1)]
-        at_node = on_edge & (at.shape.max(axis=1) >= 1.0 - ROUND_OFF)
-        pseudonormal, on_border = np.where(at_node[:, None], at_nodes[node], closest.normal), at_node & border[node]
+        (side, normals, smooth_normals, nodal_normals, border), (facet, xi) = self._facets, closest[:2]
+        feet, on_edge = facet_points(side, facet, xi), distance_from_edges(side, facet, xi) <= ROUND_OFF
+        node = feet.local[np.arange(len(facet)), feet.shape.argmax(axis=1)]
+        at_node = on_edge & (feet.shape.max(axis=1) >= 1.0 - ROUND_OFF)
+        pseudonormal = np.where(at_node[:, None], nodal_normals[node], closest.normal)
+        on_border = at_node & border[node]
         rows = np.flatnonzero(on_edge & ~at_node)
         if len(rows):
             point, adjacent, adjacent_xi = facets_containing(side, facet[rows], xi[rows])
-            others = adjacent != facet[rows][point]
-            other_normals = interpolate(normals[adjacent[others]], places(side, adjacent[others], adjacent_xi[others]))
-            np.add.at(pseudonormal, rows[point[others]], other_normals)
+            is_other = adjacent != facet[rows][point]
+            adjacent_feet = facet_points(side, adjacent[is_other], adjacent_xi[is_other])
+            other_normals = interpolate(normals[adjacent[is_other]], adjacent_feet)
+            np.add.at(pseudonormal, rows[point[is_other]], other_normals)
             on_border[rows] = np.bincount(point) == 1
-        return pseudonormal, interpolate(smooth[facet], at), on_edge, on_border
+        return pseudonormal, interpolate(smooth_normals[facet], feet), on_edge, on_border

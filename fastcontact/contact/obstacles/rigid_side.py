@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fastcontact.arrays import REFUSAL, Array, Mask, Numbers, is_masked
+from fastcontact.arrays import MASKED_ENTRIES, Array, Mask, Numbers, is_masked
 from fastcontact.contact.obstacles._obstacle import Obstacle
 from fastcontact.errors import ContactError
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -46,7 +46,7 @@ class RigidSide:
     def facing(self, positions: Array, pose: Pose) -> tuple[Array, Array, Mask, Array]:
         """Return gaps (n,), normals (n, dim), a mask (n,) of paired points and offsets (n,) at `positions` (n, dim) [length].
 
-        To first order, the gap at a position x nearby is ``offset + normal . x``.
+        To first order, the gap at a nearby position x is ``offset + normal . x``.
         """
         local = positions - pose.displacement
         if self.rotation is None or pose.angle == 0.0:
@@ -63,24 +63,25 @@ class RigidSide:
         """Return gaps (n,) [length] and normals (n, dim) [-] at `points` (n, dim) [length] before any motion."""
         distance_and_normal = self.obstacle.distance(points)
         if is_masked(distance_and_normal):
-            raise ContactError(f"the distance from a rigid obstacle {REFUSAL}; an infinite gap excludes a point")
+            raise ContactError(f"the distance from a rigid obstacle {MASKED_ENTRIES}; an infinite gap excludes a point")
         if any(np.iscomplexobj(values) for values in distance_and_normal):
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 
-    def rigid_motion(self, positions: Array, before: Array, pose: Pose, pose0: Pose) -> Array:
+    def rigid_motion(self, positions: Array, initial_positions: Array, pose: Pose, initial_pose: Pose) -> Array:
         """Return the displacements (n, dim) of points on the surface of the obstacle due to its motion [length].
 
-        The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus this result.
-        The slip is the change of the position relative to the obstacle, expressed in the frame that is rotated by half the
-        angle, and multiplied by the ratio of the arc to the chord. It vanishes where a point sticks, and is tangential to
-        the circle for a point at rest.
+        The slip of a point that moves from `initial_positions` to `positions` (n, dim) [length], while the pose changes from
+        `initial_pose` to `pose`, is its displacement minus this result. The slip is the change of the position relative to
+        the obstacle, expressed in the frame that is rotated by half the angle, and multiplied by the ratio of the arc to the
+        chord. It vanishes where a point sticks, and is tangential to the circle for a point at rest.
         """
-        angle, shift = pose.angle - pose0.angle, np.tile(pose.displacement - pose0.displacement, (len(positions), 1))
+        angle = pose.angle - initial_pose.angle
+        shift = np.tile(pose.displacement - initial_pose.displacement, (len(positions), 1))
         if self.rotation is None or angle == 0.0:
             return shift
         half_rotation, centre = self.rotation.matrix(0.5 * angle), np.array(self.rotation.centre)
-        end, start = positions - centre - pose.displacement, before - centre - pose0.displacement
+        end, start = positions - centre - pose.displacement, initial_positions - centre - initial_pose.displacement
         slip = (end @ half_rotation - start @ half_rotation.T) * (0.5 * angle / math.sin(0.5 * angle))
         return np.asarray(shift + ((end - start) - slip))
 
@@ -116,15 +117,15 @@ class Rotation:
 
     def matrix(self, angle: float) -> Array:
         """Return the matrix (dim, dim) that rotates vectors by `angle` [radian] (Rodrigues' formula)."""
-        first, second = self.generators
-        return np.asarray(np.eye(len(first)) + math.sin(angle) * first + (1.0 - math.cos(angle)) * second)
+        of_sine, of_cosine = self.generators
+        return np.asarray(np.eye(len(of_sine)) + math.sin(angle) * of_sine + (1.0 - math.cos(angle)) * of_cosine)
 
     @cached_property
     def generators(self) -> tuple[Array, Array]:
         """Coefficient matrices (dim, dim) of the sine, and of one minus the cosine, of the angle in `matrix` [-]."""
         x, y, z = self.direction
-        across, dim = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), len(self.centre)
-        return across[:dim, :dim], (across @ across)[:dim, :dim]
+        cross_product, dim = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), len(self.centre)
+        return cross_product[:dim, :dim], (cross_product @ cross_product)[:dim, :dim]
 
     def axes(self, positions: Array) -> Array:
         """Return cylindrical axes (n, dim, dim) at positions (n, dim) [length], in columns: radial, tangential, axial [-].

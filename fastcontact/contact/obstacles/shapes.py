@@ -16,20 +16,23 @@ from fastcontact.errors import ContactError
 from fastcontact.round_off import ROUND_OFF
 
 
-def _positive(**values: float) -> None:
+def _check_positive(**values: float) -> None:
+    """Raise ContactError if one of the named values is not positive."""
     for name, value in values.items():
         if not (math.isfinite(value) and value > 0):
             raise ContactError(f"{name} = {value} of a rigid obstacle must be a positive number")
 
 
 def _vector(name: str, values: ArrayLike, dim: int) -> Array:
+    """Return the parameter `name` as a vector (dim,); ContactError if it is not one."""
     vector = finite_vector(values, dim)
     if vector is None:
         raise ContactError(f"{name} = {values!r} of a rigid obstacle must be {dim} finite numbers, one per coordinate")
     return vector
 
 
-def _direction(side: str) -> float:
+def _outward_sign(side: str) -> float:
+    """Return the sign of the outward normal along the last coordinate for an obstacle below or above the body."""
     if side not in ("below", "above"):
         raise ContactError(f"side = '{side}' of a rigid obstacle must be 'below' or 'above' the body")
     return 1.0 if side == "below" else -1.0
@@ -100,7 +103,7 @@ class Sphere:
     hollow: bool = False
 
     def __post_init__(self) -> None:
-        _positive(R=self.R)
+        _check_positive(R=self.R)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
@@ -142,7 +145,7 @@ class Cylinder:
     hollow: bool = False
 
     def __post_init__(self) -> None:
-        _positive(R=self.R, length=float(np.linalg.norm(self.axis)))
+        _check_positive(R=self.R, length=float(np.linalg.norm(self.axis)))
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
@@ -183,11 +186,11 @@ class Height:
     side: str = "below"
 
     def __post_init__(self) -> None:
-        _direction(self.side)
+        _outward_sign(self.side)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
-        sign = _direction(self.side)
+        sign = _outward_sign(self.side)
         height, slope = self.function(points[:, :-1])
         normal = np.column_stack([-slope, np.ones(len(points))])
         length = np.linalg.norm(normal, axis=1)
@@ -224,8 +227,8 @@ def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
     >>> gaps
     array([1.])
     """
-    _positive(R=R)
-    sign, low = -_direction(side), float(np.asarray(tip))
+    _check_positive(R=R)
+    sign, low = -_outward_sign(side), float(np.asarray(tip))
 
     def height(x: Array) -> tuple[Array, Array]:
         return low + sign * (x * x).sum(axis=1) / (2 * R), sign * x / R
@@ -263,8 +266,8 @@ def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
     >>> gaps
     array([1.])
     """
-    _positive(slope=slope)
-    sign = -_direction(side)
+    _check_positive(slope=slope)
+    sign = -_outward_sign(side)
 
     def height(x: Array) -> tuple[Array, Array]:
         r = np.linalg.norm(x, axis=1)
@@ -303,12 +306,12 @@ class FlatPunch:
     side: str = "above"
 
     def __post_init__(self) -> None:
-        _positive(radius=self.radius)
-        _direction(self.side)
+        _check_positive(radius=self.radius)
+        _outward_sign(self.side)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`; infinite beyond the edge."""
-        sign = _direction(self.side)
+        sign = _outward_sign(self.side)
         normal = np.zeros_like(points)
         normal[:, -1] = sign
         gap = sign * (points[:, -1] - self.height)

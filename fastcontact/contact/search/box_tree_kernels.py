@@ -104,8 +104,8 @@ def square_to_box(tree, box, point):
     """Return the squared distance from a point, a tuple, to a box; 0 inside [length^2]."""
     square = 0.0
     for d in range(len(point)):
-        out = max(tree.low[box, d] - point[d], point[d] - tree.high[box, d], 0.0)
-        square += out * out
+        distance = max(tree.low[box, d] - point[d], point[d] - tree.high[box, d], 0.0)
+        square += distance * distance
     return square
 
 

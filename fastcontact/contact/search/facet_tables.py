@@ -22,8 +22,8 @@ _SQUARE_SIDES = np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, -1.0, 1.0], [
 _POWERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [0, 2], [2, 1], [1, 2], [2, 2]])
 # The largest change of the gradient of each term from that at (0, 0), and the largest second derivative (its spectral
 # norm), for s and t up to 1.
-_TURN = np.sqrt([0, 0, 0, 2, 4, 4, 5, 5, 8])
-_SECOND = np.array([0, 0, 0, 1, 2, 2, 1 + 5**0.5, 1 + 5**0.5, 6])
+_GRADIENT_CHANGES = np.sqrt([0, 0, 0, 2, 4, 4, 5, 5, 8])
+_SECOND_DERIVATIVES = np.array([0, 0, 0, 1, 2, 2, 1 + 5**0.5, 1 + 5**0.5, 6])
 # Flat triangles between the nodes, by number of nodes.
 _FLAT = {
     3: [[0, 1, 2]],
@@ -55,7 +55,7 @@ def tables(n_nodes: int) -> Tables:
     nodes = elements.get(_NAMES[n_nodes]).nodes
     sides = _TRIANGLE_SIDES if n_nodes in (3, 6) else _SQUARE_SIDES
     to_terms = np.ascontiguousarray(np.linalg.inv(terms(nodes, n_nodes)))
-    weights = np.stack([_bend(nodes), _TURN[:n_nodes], _SECOND[:n_nodes]])
+    weights = np.stack([_interpolation_errors(nodes), _GRADIENT_CHANGES[:n_nodes], _SECOND_DERIVATIVES[:n_nodes]])
     return Tables(nodes, sides, to_terms, weights)
 
 
@@ -74,8 +74,11 @@ def polynomial_degree(n_nodes: int) -> int:
     return int(_POWERS[:n_nodes].sum(axis=1).max())
 
 
-def _bend(nodes: Array) -> Array:
-    """Return, for each term of the polynomial, the largest error of its interpolation on the flat triangles."""
+def _interpolation_errors(nodes: Array) -> Array:
+    """Return, for each term of the polynomial, the largest error (m,) of its interpolation on the flat triangles [-].
+
+    It is sampled on a grid of 21 points along each side of a triangle.
+    """
     weights = np.array([[i, j, 20 - i - j] for i in range(21) for j in range(21 - i)]) / 20.0
     n = len(nodes)
     error = [weights @ terms(nodes[flat], n) - terms(weights @ nodes[flat], n) for flat in flat_triangles(n)]

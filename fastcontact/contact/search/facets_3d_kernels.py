@@ -16,7 +16,7 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
     The boxes contain the nodes, extended at curved sides by the bound on the deviation of the facet from flat triangles.
     `to_terms` and `weights` are those of `facet_tables.Tables`.
     """
-    nodes, centre, terms, bend, convex = facets
+    nodes, centre, terms, deviations, bounds = facets
     m = nodes.shape[1]
     for i in range(begin, end):
         for d in range(3):
@@ -24,7 +24,7 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
                 _fill_straight(nodes, centre, i, d, terms, low, high)
             else:
                 _fill_curved(nodes, centre, i, d, to_terms, terms, low, high)
-        bend[i], convex[i] = 0.0, np.inf
+        deviations[i], bounds[i] = 0.0, np.inf
         if m == 3:
             continue
         deviation, turn, second = _curvature(terms, i, weights)
@@ -32,10 +32,10 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
             low[i, d], high[i, d] = low[i, d] - deviation, high[i, d] + deviation
         extent = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1], high[i, 2] - low[i, 2]
         if deviation >= LENGTH_ROUND_OFF * max(extent):  # otherwise the facet is flat
-            bend[i] = deviation
+            deviations[i] = deviation
         p, q = vector(terms, i, 1), vector(terms, i, 2)
         diagonal = np.sqrt(dot(extent, extent))
-        convex[i] = uniqueness_bound(p, q, vector(terms, i, 3)) if m == 4 else _convex(p, q, turn, second, diagonal)
+        bounds[i] = uniqueness_bound(p, q, vector(terms, i, 3)) if m == 4 else _convexity(p, q, turn, second, diagonal)
 
 
 @inlined_kernel
@@ -81,7 +81,7 @@ def _curvature(terms, i, weights):
 
 
 @kernel
-def _convex(p, q, turn, second, diagonal):
+def _convexity(p, q, turn, second, diagonal):
     """Return the square of a distance below which half the squared distance is convex on a facet, with tangents p and q.
 
     Its Hessian is J^T J - r . X'' with the tangents J: positive definite where the smallest singular value of J, squared,

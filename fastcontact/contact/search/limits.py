@@ -4,4 +4,4 @@
 STEP = 1e-13
 MAX_ITERATIONS = 100
 # Largest overhang of a projection beyond its facet, in facet lengths, at which the projection is accepted.
-BEYOND = 1.0
+LARGEST_OVERHANG = 1.0

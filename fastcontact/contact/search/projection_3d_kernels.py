@@ -19,7 +19,7 @@ from fastcontact.round_off import ROUND_OFF
 class Facets(NamedTuple):
     """Facets of one element type, relative to their centre, because round-off far from the origin would exceed STEP.
 
-    `convex` is a bound up to which a local minimum of the distance is unique. For four nodes it is that of
+    Up to `convexity_bound`, a local minimum of the distance is unique. For four nodes it is that of
     `straight_3d_kernels.uniqueness_bound`. For more nodes it is the square of a distance, below which half the squared
     distance is a convex function.
     """
@@ -27,12 +27,12 @@ class Facets(NamedTuple):
     nodes: Array  # (n_facets, m, 3), relative to the origin [length]
     centre: Array  # (3,): centre of all nodes [length]
     terms: Array  # (n_facets, m, 3): coefficients of the polynomials [length]
-    bend: Array  # (n_facets,): bound on a facet's deviation from the flat triangles between its nodes [length]
-    convex: Array  # (n_facets,) [length^2]
+    deviation: Array  # (n_facets,): bound on a facet's deviation from the flat triangles between its nodes [length]
+    convexity_bound: Array  # (n_facets,) [length^2]
 
 
 class Domain(NamedTuple):
-    """Reference nodes (m, 2), flat triangles between them (n_triangles, 3), and sides (n_sides, 3) of facets of a kind."""
+    """Reference nodes (m, 2), flat triangles between them (n_triangles, 3), and sides (n_sides, 3) of one element type."""
 
     nodes: Array
     triangles: Indices
@@ -105,7 +105,7 @@ def _expansion(terms, f, s, t, point):
 
 
 @kernel
-def _allowed(sides, s, t, ps, pt, size):
+def _is_feasible(sides, s, t, ps, pt, size):
     """Return whether a step (ps, pt) from (s, t) stays in the domain at all sides on which (s, t) lies."""
     for k in range(sides.shape[0]):
         on_side = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ROUND_OFF
@@ -115,10 +115,10 @@ def _allowed(sides, s, t, ps, pt, size):
 
 
 @kernel
-def _definite(hss, hst, htt):
-    """Return the Hessian with the absolute values of its eigenvalues, shifted slightly from zero if it is not definite.
+def _positive_definite(hss, hst, htt):
+    """Return the Hessian if it is positive definite, otherwise with absolute eigenvalues, shifted slightly from zero.
 
-    For two by two, |H| = (H^2 + |det H| I) / sqrt(tr H^2 + 2 |det H|), by the theorem of Cayley and Hamilton.
+    For a 2 x 2 matrix, |H| = (H^2 + |det H| I) / sqrt(tr H^2 + 2 |det H|), by the theorem of Cayley and Hamilton.
     """
     square = hss * hss + 2.0 * hst * hst + htt * htt
     determinant = hss * htt - hst * hst
@@ -132,10 +132,10 @@ def _definite(hss, hst, htt):
 @kernel
 def _newton_step(sides, s, t, gs, gt, hss, hst, htt):
     """Return the step to the minimum of the quadratic model over the directions that stay in the domain."""
-    ass, ast, att = _definite(hss, hst, htt)
+    ass, ast, att = _positive_definite(hss, hst, htt)
     determinant = ass * att - ast * ast
     ps, pt = -(att * gs - ast * gt) / determinant, -(ass * gt - ast * gs) / determinant
-    if _allowed(sides, s, t, ps, pt, abs(ps) + abs(pt)):
+    if _is_feasible(sides, s, t, ps, pt, abs(ps) + abs(pt)):
         return ps, pt
     ps, pt, gain = 0.0, 0.0, 0.0
     for k in range(sides.shape[0]):
@@ -143,12 +143,12 @@ def _newton_step(sides, s, t, gs, gt, hss, hst, htt):
             continue
         us, ut = -sides[k, 1], sides[k, 0]
         slope = gs * us + gt * ut
-        along = hss * us * us + 2.0 * hst * us * ut + htt * ut * ut
-        along = max(abs(along), 1e-6 * (ass + att))
-        if slope * slope / along > gain:
-            length = -slope / along
-            if _allowed(sides, s, t, length * us, length * ut, abs(length)):
-                ps, pt, gain = length * us, length * ut, slope * slope / along
+        curvature = hss * us * us + 2.0 * hst * us * ut + htt * ut * ut
+        curvature = max(abs(curvature), 1e-6 * (ass + att))
+        if slope * slope / curvature > gain:
+            length = -slope / curvature
+            if _is_feasible(sides, s, t, length * us, length * ut, abs(length)):
+                ps, pt, gain = length * us, length * ut, slope * slope / curvature
     return ps, pt
 
 
@@ -170,13 +170,13 @@ def _downhill(terms, f, s, t, sides, point, value, hss, hst, htt):
         length = 0.1 / np.sqrt(us * us + ut * ut)
         for sign in (length, -length):
             ps, pt = sign * us, sign * ut
-            if _fits(sides, s + ps, t + pt) and half_square(terms, f, s + ps, t + pt, point) < value * (1.0 - 1e-12):
+            if _inside(sides, s + ps, t + pt) and half_square(terms, f, s + ps, t + pt, point) < value * (1.0 - 1e-12):
                 return ps, pt
     return 0.0, 0.0
 
 
 @kernel
-def _fits(sides, s, t):
+def _inside(sides, s, t):
     """Return whether (s, t) lies in the domain."""
     for k in range(sides.shape[0]):
         if sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t < -ROUND_OFF:
@@ -220,28 +220,28 @@ def descend(terms, f, s, t, sides, point):
 def project(facets, f, domain, point, reach):
     """Return (s, t) of the point of facet `f` closest to `point`, half the squared distance, and whether it converged.
 
-    The facet deviates from the flat triangles between its nodes by at most `bend`. The descent starts from the closest
-    triangle. With more than four nodes, a minimum within `convex` is unique. Otherwise the descent is restarted on every
-    triangle that may contain a closer point. The returned distance is infinite if its square exceeds `reach`.
+    The facet deviates from the flat triangles between its nodes by at most `deviation`. The descent starts from the closest
+    triangle. With more than four nodes, a minimum within `convexity_bound` is unique. Otherwise the descent is restarted on
+    every triangle that may contain a closer point. The returned distance is infinite if its square exceeds `reach`.
     """
-    terms, bend = facets.terms, facets.bend[f]
+    terms, deviation = facets.terms, facets.deviation[f]
     nodes, triangles, sides = domain
     s, t, flat = 0.0, 0.0, np.inf
     for k in range(triangles.shape[0]):
         a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
         if square < flat:
             s, t, flat = a, b, square
-    least = max(np.sqrt(flat) - bend, 0.0)
+    least = max(np.sqrt(flat) - deviation, 0.0)
     if least * least > reach:
         return s, t, np.inf, True
     tried_s, tried_t = s, t
     s, t, converged = descend(terms, f, s, t, sides, point)
     best = half_square(terms, f, s, t, point)
-    if converged and terms.shape[1] > 4 and 2.0 * best < facets.convex[f]:
+    if converged and terms.shape[1] > 4 and 2.0 * best < facets.convexity_bound[f]:
         return s, t, best, True
-    for k in range(triangles.shape[0] if bend > 0.0 else 0):
+    for k in range(triangles.shape[0] if deviation > 0.0 else 0):
         a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
-        largest = np.sqrt(2.0 * best) + bend
+        largest = np.sqrt(2.0 * best) + deviation
         if square > largest * largest or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
             continue
         a, b, success = descend(terms, f, a, b, sides, point)
@@ -250,7 +250,7 @@ def project(facets, f, domain, point, reach):
             s, t, best, converged = a, b, value, success
     side = minus(node(facets, f, 1), node(facets, f, 0))
     # Near the centres of curvature the distance has several minima on one triangle, so that the descent starts at every node.
-    for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * bend > dot(side, side) else 0):
+    for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * deviation > dot(side, side) else 0):
         a, b, success = descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
         value = half_square(terms, f, a, b, point)
         if value < best:
@@ -260,7 +260,7 @@ def project(facets, f, domain, point, reach):
 
 @kernel
 def _on_triangle(facets, f, nodes, triangles, k, point):
-    """Return (s, t) on facet `f` of the point of its flat triangle `k` closest to `point`, and its squared distance."""
+    """Return (s, t) of the point of flat triangle `k` of facet `f` that is closest to `point`, and its squared distance."""
     a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
     origin = node(facets, f, a)
     p, q, r = minus(node(facets, f, b), origin), minus(node(facets, f, c), origin), minus(point, origin)
@@ -289,7 +289,7 @@ def onto_sides(sides, s, t):
 def frame(terms, f, s, t, point, sides, nodes):
     """Return the unit normal of facet `f` at (s, t) and the overhang of `point` beyond the domain's sides.
 
-    The overhang, in spans of the domain, follows from the point's reference coordinates on the tangent plane of the facet.
+    The overhang, in facet lengths, follows from the point's reference coordinates on the tangent plane of the facet.
     """
     x, xs, xt, _, _, _ = component(terms, f, 0, s, t)
     y, ys, yt, _, _, _ = component(terms, f, 1, s, t)

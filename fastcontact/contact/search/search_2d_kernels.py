@@ -8,7 +8,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
-from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS, STEP
+from fastcontact.contact.search.limits import LARGEST_OVERHANG, MAX_ITERATIONS, STEP
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
@@ -115,9 +115,9 @@ def _write(result, i, nodes, f, s, x, y):
     """Fill the results for point `i`, at (x, y), except the number of the facet `f`."""
     px, py, tx, ty, _, _ = _curve(nodes, f, s)
     square = tx * tx + ty * ty
-    length, along = np.sqrt(square), ((x - px) * tx + (y - py) * ty) / square
+    length, tangential = np.sqrt(square), ((x - px) * tx + (y - py) * ty) / square
     result.xi[i, 0], result.normal[i, 0], result.normal[i, 1] = s, ty / length, -tx / length
-    outward = along if s == 1.0 else -along if s == -1.0 else 0.0
+    outward = tangential if s == 1.0 else -tangential if s == -1.0 else 0.0
     result.overhang[i] = max(0.5 * outward, 0.0)
     # A weighted mean of the nodes, which at an end of the facet is exactly that node.
     a, b, c = 0.5 * (1.0 - s), 0.5 * (1.0 + s), 0.0
@@ -147,7 +147,7 @@ def _newton(x, y, corners, normals, f, s):
             return s, False
         step = min(1.0, max(-1.0, -(dx * ny - dy * nx) / slope))
         s += step
-        if 0.5 * (abs(s) - 1.0) > 2.0 * BEYOND:
+        if 0.5 * (abs(s) - 1.0) > 2.0 * LARGEST_OVERHANG:
             return s, False
         if abs(step) <= STEP * (1.0 + abs(s)):
             return s, True
@@ -161,7 +161,7 @@ def along_normals(points, corners, normals, neighbour, facet, xi, overhang):
     Parameters
     ----------
     points : ndarray (n, 2)
-        [length].
+        Positions [length].
     corners, normals : ndarray (n_facets, k, 2)
         Nodes of the facets and unit normals there, ends first; k is 2 or 3. With three nodes, a straight facet has its middle
         as the third one.
@@ -174,7 +174,7 @@ def along_normals(points, corners, normals, neighbour, facet, xi, overhang):
         f, s, previous = facet[i], xi[i], -1
         for _ in range(MAX_ITERATIONS):
             s, converged = _newton(points[i, 0], points[i, 1], corners, normals, f, s)
-            if not converged or 0.5 * (abs(s) - 1.0) > BEYOND:
+            if not converged or 0.5 * (abs(s) - 1.0) > LARGEST_OVERHANG:
                 break
             if abs(s) <= 1.0:
                 facet[i], xi[i], overhang[i] = f, s, 0.0

@@ -6,7 +6,7 @@ import numpy as np
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
 from fastcontact.contact.search.projection_3d_kernels import component, frame, onto_sides, project, vector
-from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, on_bilinear, on_flat, unit
+from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, on_bilinear, on_flat, plus_multiple, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
@@ -60,7 +60,7 @@ def _write(result, i, facets, f, domain, s, t, point, foot, inside, converged):
     """Fill the results for point `i`, except the number of the facet `f`."""
     if inside:
         a, b, c = vector(facets.terms, f, 1), vector(facets.terms, f, 2), _twist(facets.terms, f)
-        normal, overhang = unit(cross(along(a, c, t), along(b, c, s))), 0.0
+        normal, overhang = unit(cross(plus_multiple(a, c, t), plus_multiple(b, c, s))), 0.0
     else:
         s, t = onto_sides(domain.sides, s, t)
         normal, overhang = frame(facets.terms, f, s, t, point, domain.sides, domain.nodes)
@@ -94,11 +94,11 @@ def _projected(facets, f, domain, point, reach):
         else:
             s, t, d = on_bilinear(r, a, b, c, np.sqrt(reach))
             inside = abs(s) < 1.0 and abs(t) < 1.0
-        foot = along(along(along(o, a, s), b, t), c, s * t)
+        foot = plus_multiple(plus_multiple(plus_multiple(o, a, s), b, t), c, s * t)
         offset = minus(point, foot)
         if d == np.inf:
             return s, t, foot, np.inf, True, False
-        if terms.shape[1] == 3 or (abs(dot(offset, c)) < facets.convex[f] and d >= 0.0):
+        if terms.shape[1] == 3 or (abs(dot(offset, c)) < facets.convexity_bound[f] and d >= 0.0):
             return s, t, foot, dot(offset, offset), True, inside
     s, t, d, converged = project(facets, f, domain, point, reach)
     foot = component(terms, f, 0, s, t)[0], component(terms, f, 1, s, t)[0], component(terms, f, 2, s, t)[0]

@@ -37,7 +37,7 @@ def unit(a):
 
 
 @kernel
-def along(o, a, s):
+def plus_multiple(o, a, s):
     """Return the vector ``o + s a``."""
     return o[0] + s * a[0], o[1] + s * a[1], o[2] + s * a[2]
 
@@ -130,8 +130,8 @@ def on_bilinear(r, a, b, c, reach):
         s, t, square = _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr)
         # The minimum over the sides is the global one if the distance does not decrease into the facet.
         v = residual(r, a, b, c, s, t)
-        inward = (abs(s) == 1.0 and s * dot(v, along(a, c, t)) < 0.0) or (
-            abs(t) == 1.0 and t * dot(v, along(b, c, s)) < 0.0
+        inward = (abs(s) == 1.0 and s * dot(v, plus_multiple(a, c, t)) < 0.0) or (
+            abs(t) == 1.0 and t * dot(v, plus_multiple(b, c, s)) < 0.0
         )
         if not inward:
             return s, t, square
@@ -190,7 +190,7 @@ def uniqueness_bound(a, b, c):
     area, product, first, second = np.inf, 0.0, 0.0, 0.0
     for corner in range(4):
         s, t = (1.0 if corner < 2 else -1.0), (1.0 if corner % 2 == 0 else -1.0)
-        p, q = along(a, c, t), along(b, c, s)
+        p, q = plus_multiple(a, c, t), plus_multiple(b, c, s)
         area, product = min(area, dot(cross(p, q), normal)), max(product, abs(dot(p, q)))
         first, second = max(first, dot(p, p)), max(second, dot(q, q))
     if not area > 0.0:

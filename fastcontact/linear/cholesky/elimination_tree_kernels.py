@@ -48,14 +48,14 @@ def postordered(parent: Numbers, position: Numbers) -> None:
             size[parent[j]] += size[j]
     end[n] = n
     for j in range(n - 1, -1, -1):
-        above = parent[j] if parent[j] != -1 else n
-        position[j] = end[j] = end[above] - 1
-        end[above] -= size[j]
+        parent_or_end = parent[j] if parent[j] != -1 else n
+        position[j] = end[j] = end[parent_or_end] - 1
+        end[parent_or_end] -= size[j]
 
 
 @interpretable_kernel
 def supernodes(
-    parent: Numbers, count: Numbers, marked: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
+    parent: Numbers, count: Numbers, marked: Mask, widths: Offsets, shares: Array, first: Offsets, n_below: Offsets
 ) -> int:
     """Find supernodes, which are sequences of columns with nearly the same rows below them, and return their number.
 
@@ -69,42 +69,42 @@ def supernodes(
         Adjacent supernodes are merged if the fraction of explicit zeros in the result is at most ``shares[i]``, where
         ``widths[i]`` is the first of the ascending `widths` that is not smaller than the width of the result. The last share
         applies to all wider supernodes.
-    first, below : ndarray of int (n + 1,)
+    first, n_below : ndarray of int (n + 1,)
         The first column of each supernode, followed by n, and the number of rows below each supernode; filled here.
     """
     n, top = len(parent), -1
     entries = np.empty(n, np.int64)
     for j in range(n + 1):
-        continues = 0 < j < n and parent[j - 1] == j and count[j - 1] == count[j] + 1 and marked[j - 1] == marked[j]
-        if not continues:
+        connected = 0 < j < n and parent[j - 1] == j and count[j - 1] == count[j] + 1 and marked[j - 1] == marked[j]
+        if not connected:
             if top >= 0:
-                top = _merged(parent, marked, widths, shares, first, below, entries, top, j)
+                top = _merge(parent, marked, widths, shares, first, n_below, entries, top, j)
             top += 1
             first[top] = j
             if j < n:
                 entries[top] = 0
         if j < n:
             entries[top] += count[j]
-            below[top] = count[j] - 1
+            n_below[top] = count[j] - 1
     return top
 
 
 @inlined_kernel
-def _merged(
-    parent: Numbers, marked: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
+def _merge(
+    parent: Numbers, marked: Mask, widths: Offsets, shares: Array, first: Offsets, n_below: Offsets, entries: Offsets,
     top: int, end: int,
 ) -> int:  # fmt: skip
     """Merge the supernode `top`, which ends before column `end`, with its predecessors while this adds few zeros."""
     while top > 0 and first[top] <= parent[first[top] - 1] < end and marked[first[top] - 1] == marked[first[top]]:
         width = end - first[top - 1]
-        all_entries = width * (width + 1) // 2 + width * below[top]
+        all_entries = width * (width + 1) // 2 + width * n_below[top]
         k = 0
         while k < len(widths) and width > widths[k]:
             k += 1
         if all_entries - entries[top - 1] - entries[top] > shares[k] * all_entries:
             break
         entries[top - 1] += entries[top]
-        below[top - 1] = below[top]
+        n_below[top - 1] = n_below[top]
         top -= 1
     return top
 
@@ -120,18 +120,18 @@ def rows_below(
     column ``order[k]`` of the matrix, and `position` is the inverse of `order`.
     """
     n, count = len(order), len(first) - 1
-    members, last_row, at = np.empty(n, np.int32), np.full(count, -1, np.int32), row_start[:count].copy()
+    supernode_of, last_row, at = np.empty(n, np.int32), np.full(count, -1, np.int32), row_start[:count].copy()
     for s in range(count):
-        members[first[s] : first[s + 1]] = s
+        supernode_of[first[s] : first[s + 1]] = s
     for i in range(n):
         # From each entry of the row, follow the tree to a supernode that was visited before, or to the diagonal.
         for k in range(start[order[i]], start[order[i] + 1]):
             j = position[rows[k]]
             if j >= i:
                 continue
-            s = members[j]
-            while s != members[i] and last_row[s] != i:
+            s = supernode_of[j]
+            while s != supernode_of[i] and last_row[s] != i:
                 last_row[s] = i
                 row_indices[at[s]] = i
                 at[s] += 1
-                s = members[parent[first[s + 1] - 1]]
+                s = supernode_of[parent[first[s + 1] - 1]]

@@ -23,12 +23,12 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
 
 
-def singular() -> ModelError:
+def singular_matrix_error() -> ModelError:
     """Return the error for a matrix with a pivot of zero."""
     return ModelError("the stiffness matrix is singular: support the rigid-body motions of every body")
 
 
-def fill_reducing(K: bsr_array, last: Indices, connected: bool = False) -> Indices:
+def fill_reducing_order(K: bsr_array, last: Indices, connected: bool = False) -> Indices:
     """Return the unknowns (n,) of K in a fill-reducing elimination order, with the unknowns `last` (m,) at the end.
 
     If `connected` is true, the order takes into account that the unknowns `last` are coupled with each other after the
@@ -60,7 +60,7 @@ def reordered(K: bsr_array, order: Indices) -> csc_array:
     return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # K is symmetric: its rows are its columns
 
 
-class Previous(NamedTuple):
+class OldFactors(NamedTuple):
     """Results of the previous factorisation that the next one may reuse.
 
     Attributes
@@ -100,16 +100,16 @@ class SymbolicFactors:
     def __init__(self, K: bsr_array, last: Indices, repeated: bool = False) -> None:
         n, is_last = K.shape[0], np.zeros(K.shape[0], bool)
         self._pattern, self._last = (K.indptr, K.indices), last
-        self._previous = Previous(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
+        self._previous = OldFactors(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
         self._entry_numbers: csc_array | None = None
-        self._first: csc_array | None
-        orders = [fill_reducing(K, last, connected) for connected in (False, True)[: 1 + repeated]]
-        options = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
-        order, self._first, self._tree = min(options, key=lambda entry: np.square(entry[2].entries, dtype=float).sum())
+        self._A: csc_array | None  # K in the elimination order, until its factors have been computed
+        orders = [fill_reducing_order(K, last, connected) for connected in (False, True)[: 1 + repeated]]
+        candidates = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
+        order, self._A, self._tree = min(candidates, key=lambda entry: np.square(entry[2].entries, dtype=float).sum())
         self._unknowns, self._position = order[self._tree.order], np.empty(n, np.intp)
         self._position[self._unknowns] = np.arange(n)
         is_last[self._position[last]] = True
-        self._supernodes = supernodes(self._first, self._tree, is_last)
+        self._supernodes = supernodes(self._A, self._tree, is_last)
         parent = self._tree.parent[self._supernodes.first[1:] - 1].astype(np.int64)
         self._parent = np.where(parent < 0, -1, np.searchsorted(self._supernodes.first, parent, side="right") - 1)
 
@@ -138,10 +138,10 @@ class SymbolicFactors:
         )  # fmt: skip
         if failed >= 0:
             if abs(d[failed]) <= LENGTH_ROUND_OFF * A.diagonal()[permutation[0][failed]]:
-                raise singular()
+                raise singular_matrix_error()
             raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
         if self._entry_numbers is not None:
-            self._previous = Previous(A.data, target, (values, d, updates) if (target >= 0).any() else NO_FACTORS)
+            self._previous = OldFactors(A.data, target, (values, d, updates) if (target >= 0).any() else NO_FACTORS)
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
 
     def _plan(self, A: csc_array, order: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
@@ -161,8 +161,8 @@ class SymbolicFactors:
         From the second matrix on, only the lower triangle in this order is returned, for which the positions of the entries
         are cached.
         """
-        if self._first is not None:
-            A, self._first = self._first, None
+        if self._A is not None:
+            A, self._A = self._A, None
             return A, self._tree.order, self._tree.position
         if self._entry_numbers is None:
             numbers = np.arange(K.data.size, dtype=np.int64).reshape(K.data.shape)

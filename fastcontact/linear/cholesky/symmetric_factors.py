@@ -65,29 +65,29 @@ class SymmetricFactors:
     @on_one_blas_thread
     def inverse_entries(self, rows: Indices, columns: Indices) -> Array:
         """Return the entries (m, k) of ``K^-1`` in `rows` (m,) and `columns` (k,) [length / force]."""
-        at_rows, at_columns = self._position[rows], self._position[columns]
+        row_positions, column_positions = self._position[rows], self._position[columns]
         # Neighbouring columns of the factors have common ancestors in the elimination tree.
-        entries, order = np.empty((len(rows), len(columns))), np.argsort(at_columns)
+        entries, order = np.empty((len(rows), len(columns))), np.argsort(column_positions)
         size = min(BATCH, max(1, self.nnz // self.n))  # the right-hand sides take no more memory than the factors
         for batch in (order[begin : begin + size] for begin in range(0, len(order), size)):
             X, loaded, required = np.zeros((self.n, len(batch))), np.zeros(self.n, bool), np.zeros(self.n, bool)
-            X[at_columns[batch], np.arange(len(batch))] = 1.0
-            loaded[at_columns[batch]], required[at_rows] = True, True
+            X[column_positions[batch], np.arange(len(batch))] = 1.0
+            loaded[column_positions[batch]], required[row_positions] = True, True
             triangular_kernels.solve_together(*self._L, self._d, loaded, required, X)
-            entries[:, batch] = X[at_rows]
+            entries[:, batch] = X[row_positions]
         return entries
 
     @on_one_blas_thread
     def last_inverse(self) -> Array:
         """Return the block (m, m) of ``K^-1`` for the unknowns `last` (m,), in this order [length / force]."""
-        at = np.sort(self._position[self._last])
-        index, trailing = np.full(self.n, -1), np.zeros((len(at), len(at)))
-        index[at] = np.arange(len(at))
+        positions = np.sort(self._position[self._last])
+        index, trailing = np.full(self.n, -1), np.zeros((len(positions), len(positions)))
+        index[positions] = np.arange(len(positions))
         triangular_kernels.copy_block(*self._L, index, trailing)
         # The last block of L D^1/2 is the Cholesky factor of the Schur complement, whose inverse is the block of K^-1.
-        inverse, _ = dpotri(trailing * np.sqrt(self._d[at]), lower=True)
+        inverse, _ = dpotri(trailing * np.sqrt(self._d[positions]), lower=True)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        order = np.searchsorted(at, self._position[self._last])
+        order = np.searchsorted(positions, self._position[self._last])
         return np.ascontiguousarray(inverse[np.ix_(order, order)])
 
     def harmonic_extension(self, u: Array) -> Array:

@@ -27,10 +27,10 @@ from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 # Smallest admissible ratio of the sum of the absolute values in a row after lumping into nodal blocks to that before lumping.
 SMALLEST_LUMPED_RATIO = 0.3
-Apply = Callable[[Array], Array]
+Solve = Callable[[Array], Array]
 
 
-class RepeatedError(ConvergenceError):
+class DependenceError(ConvergenceError):
     """Raised if constraints are linearly dependent."""
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class RepeatedError(ConvergenceError):
         )
 
 
-class CoupledError(RepeatedError):
+class CoupledError(DependenceError):
     """Raised if the equations of many nodes involve the same unknowns and cannot be eliminated."""
 
     def __init__(self) -> None:
@@ -92,18 +92,18 @@ class CoupledPivots:
     Attributes
     ----------
     sparse : SparseInverse
-        Inverse of the `lumped` matrix, which approximates P^-1 in a preconditioner.
+        Inverse of the `lumped_matrix`, which approximates P^-1 in a preconditioner.
 
     Raises
     ------
     CoupledError
         If P is singular or nearly singular, or if lumping cancels most of a row.
-    RepeatedError
+    DependenceError
         If the lumped matrix is singular.
     """
 
     def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
-        L = lumped(P, pivots, size)
+        L = lumped_matrix(P, pivots, size)
         ratio = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
         if not ratio.min() >= SMALLEST_LUMPED_RATIO:
             raise CoupledError()
@@ -127,7 +127,7 @@ class CoupledPivots:
 Inverse: TypeAlias = SparseInverse | CoupledPivots
 
 
-def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
+def lumped_matrix(P: csr_array, pivots: Indices, size: int) -> csr_array:
     """Return P (m, m) with the entries of each row summed, for each direction, into the diagonal block of its node.
 
     Entries in directions in which the node of the row has no pivot are omitted. In the other directions, the product with a
@@ -148,7 +148,7 @@ def block_inverse(A: csr_array) -> csr_array:
 
     Raises
     ------
-    RepeatedError
+    DependenceError
         If a block is singular to machine precision.
     """
     m = A.shape[0]
@@ -176,17 +176,17 @@ def block_inverse(A: csr_array) -> csr_array:
 
 
 def _inverses(blocks: Array) -> Array:
-    """Return the inverses (n, k, k) of `blocks` (n, k, k); raise a RepeatedError if one of them is singular."""
+    """Return the inverses (n, k, k) of `blocks` (n, k, k); raise a DependenceError if one of them is singular."""
     try:
         inverses = np.asarray(np.linalg.inv(blocks), np.float64)
     except np.linalg.LinAlgError:
-        raise RepeatedError() from None
+        raise DependenceError() from None
     if not (np.abs(blocks).max(axis=(1, 2)) * np.abs(inverses).max(axis=(1, 2)) < 1.0 / ROUND_OFF).all():
-        raise RepeatedError()
+        raise DependenceError()
     return inverses
 
 
-def condition(P: csr_array, solve: Apply, solve_transposed: Apply) -> float:
+def condition(P: csr_array, solve: Solve, solve_transposed: Solve) -> float:
     """Return an estimate of the componentwise condition number of P (m, m) (Skeel, 1979).
 
     The condition number is the largest component of ``abs(P^-1) @ abs(P) @ ones`` and does not depend on the scaling of the

@@ -123,7 +123,7 @@ def eliminate(
 
     Raises
     ------
-    RepeatedError
+    DependenceError
         If the equations are linearly dependent.
     """
     B = csr_array(B, copy=True)

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.delassus import solve_multipliers
 from fastcontact.linear.elimination.elimination import eliminate
-from fastcontact.linear.elimination.pivot_order import RepeatedError
+from fastcontact.linear.elimination.pivot_order import DependenceError
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import LinearSolver, Loaded, Monitor
 from fastcontact.round_off import SUM_ROUND_OFF
@@ -57,17 +57,17 @@ class LoadedIteration(Loaded):
         if C is None or not B.shape[0]:
             try:
                 elimination = eliminate(B, c, None, nodes, solver.K.blocksize[0]) if B.shape[0] else None
-            except RepeatedError as repeated:
-                log.info("%s (the Delassus operator is formed instead)", repeated)
+            except DependenceError as error:
+                log.info("%s (the Delassus operator is formed instead)", error)
             else:
                 u = solver.solution(self._f, elimination, guess, monitor, tolerance)
                 return u, solver.multiplier(elimination, u, self._f)
-        multiplier = solve_multipliers(solver.columns.of_rows(B), c - B @ self._unconstrained, C)
+        multiplier = solve_multipliers(solver.columns.delassus(B), c - B @ self._unconstrained, C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._unconstrained, self._solver.columns.of_rows(R)
+        return R @ self._unconstrained, self._solver.columns.delassus(R)
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""

@@ -24,8 +24,8 @@ from fastcontact.arrays import Indices, Mask
 from fastcontact.linear.elimination.coupled_pivots import (
     CoupledError,
     CoupledPivots,
+    DependenceError,
     Inverse,
-    RepeatedError,
     SparseInverse,
     block_inverse,
 )
@@ -38,7 +38,7 @@ SMALLEST_PIVOT = 0.25
 # equations whose pivots are chosen by a dense QR factorisation.
 LARGEST_BLOCK, LARGEST_DENSE = 64, 500
 # Largest number of layers of equations. The inverse is a sum with one product of sparse matrices for each layer.
-MOST_LAYERS = 4
+MAX_LAYERS = 4
 
 
 def choose_pivots(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, Inverse]:
@@ -62,7 +62,7 @@ def choose_pivots(B: csr_array, nodes: Indices | None = None, size: int = 1) -> 
 
     Raises
     ------
-    RepeatedError
+    DependenceError
         If the equations are linearly dependent.
     """
     if not B.shape[0]:
@@ -83,18 +83,18 @@ def column_inverse(B: csr_array, pivots: Indices, size: int) -> Inverse:
 
     Raises
     ------
-    RepeatedError
+    DependenceError
         If the matrix is singular.
     """
     P = csr_array(B[:, pivots])
-    if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
+    if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MAX_LAYERS)) is not None:
         return inverse
     largest = np.bincount(connected_components(P, directed=False)[1]).max(initial=0)
     if largest > LARGEST_BLOCK:
         try:
             return CoupledPivots(P, pivots, size)
         except CoupledError:
-            if (inverse := _triangular_inverse(P, LARGEST_DENSE, 2 * MOST_LAYERS)) is not None:
+            if (inverse := _triangular_inverse(P, LARGEST_DENSE, 2 * MAX_LAYERS)) is not None:
                 return inverse
             if largest > LARGEST_DENSE:
                 raise
@@ -109,8 +109,8 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
     label = connected_components(P, connection="strong")[1]
     if np.bincount(label).max(initial=0) > largest:
         return None
-    inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
-    values = (np.where(mask, P.data, 0.0) for mask in (inside, ~inside))
+    in_diagonal_block = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
+    values = (np.where(mask, P.data, 0.0) for mask in (in_diagonal_block, ~in_diagonal_block))
     diagonal, off_diagonal = (csr_array((data, P.indices, P.indptr), shape=P.shape, copy=True) for data in values)
     diagonal.eliminate_zeros()
     off_diagonal.eliminate_zeros()
@@ -124,7 +124,7 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
     return None
 
 
-def pivots_of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
+def pivots_of_groups(B: csr_array, groups: Indices, layers: int = MAX_LAYERS) -> Indices | None:
     """Return the pivots (m,), chosen among the exclusive unknowns of groups; None if a group has too few of them.
 
     An unknown is exclusive to a group if no other group of the same or of a later layer involves it. The first layer
@@ -142,7 +142,7 @@ def pivots_of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -
     layers : int
         Largest number of layers.
     """
-    pivots = _in_layers(B, groups, layers)
+    pivots = _pivots_in_layers(B, groups, layers)
     return pivots if (pivots >= 0).all() else None
 
 
@@ -153,12 +153,12 @@ def pivots_of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
     result is None if no group has enough exclusive unknowns, or if more than LARGEST_DENSE equations remain. For the
     parameters see `pivots_of_groups`.
     """
-    pivots = _in_layers(B, groups, MOST_LAYERS)
+    pivots = _pivots_in_layers(B, groups, MAX_LAYERS)
     remaining = np.flatnonzero(pivots < 0)
     if len(remaining) == len(pivots):
         return None
     # A single equation may have an exclusive unknown although its group has too few of them.
-    pivots[remaining] = _in_layers(csr_array(B[remaining]), np.arange(len(remaining)), layers=1)
+    pivots[remaining] = _pivots_in_layers(csr_array(B[remaining]), np.arange(len(remaining)), layers=1)
     remaining = remaining[pivots[remaining] < 0]
     if len(remaining) > LARGEST_DENSE:
         return None
@@ -167,7 +167,7 @@ def pivots_of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
     return pivots
 
 
-def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
+def _pivots_in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
     """Return the pivots (m,), chosen in up to `layers` layers, and -1 for equations without pivot; see `pivots_of_groups`."""
     m, n = B.shape
     group, row = np.unique(groups, return_inverse=True)[1], entry_rows(B)
@@ -254,13 +254,13 @@ def matched_pivots(B: csr_array) -> Indices:
 
     Raises
     ------
-    RepeatedError
+    DependenceError
         If there are no m different pivots.
     """
     if B.shape[0] <= LARGEST_DENSE:
         columns = np.unique(B.indices)
         if len(columns) < B.shape[0]:
-            raise RepeatedError()
+            raise DependenceError()
         *_, order = qr(B[:, columns].toarray(), mode="r", pivoting=True)
         return np.asarray(columns[order[: B.shape[0]]], np.intp)
     largest = np.abs(B.data).max()
@@ -268,5 +268,5 @@ def matched_pivots(B: csr_array) -> Indices:
     try:
         row, pivots = min_weight_full_bipartite_matching(cost)
     except ValueError:
-        raise RepeatedError() from None
+        raise DependenceError() from None
     return np.asarray(pivots[np.argsort(row)], np.intp)

@@ -14,7 +14,7 @@ import numpy as np
 from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import AnyArray, Array, largest
 from fastcontact.linear.krylov import krylov_kernels
-from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
+from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_PER_ENTRY
 
 # Function ``multiply(p, q)`` that fills q (n,) with ``A @ p``, and function ``precondition(r, norm, z)`` that fills z (n,)
 # with an approximation of ``A^-1 r``, given the 2-norm of r.
@@ -30,7 +30,7 @@ FAILED_REDUCTION = 0.98
 
 def scaled(factor: float, a: AnyArray, b: AnyArray) -> None:
     """Fill `b` (n,) with ``factor * a``, in the precision of b."""
-    parallel_for(krylov_kernels.scaled, len(a), WORK_OF_NUMBER, factor, a, b)
+    parallel_for(krylov_kernels.scaled, len(a), WORK_PER_ENTRY, factor, a, b)
 
 
 class Iteration:
@@ -58,7 +58,7 @@ class Iteration:
 
     def dot(self, a: Array, b: Array) -> float:
         """Return the dot product of two vectors (n,)."""
-        parallel_for(krylov_kernels.dot, len(self._sums), WORK_OF_NUMBER * CHUNK, a, b, self._sums)
+        parallel_for(krylov_kernels.dot, len(self._sums), WORK_PER_ENTRY * CHUNK, a, b, self._sums)
         return float(krylov_kernels.total(self._sums))
 
     def start(self) -> None:
@@ -73,17 +73,17 @@ class Iteration:
         """
         if self._last_step is None:
             return 0.0
-        alpha, p, before = self._last_step
-        return abs(alpha) * largest(p[:n]) / (before - self.norm) if self.norm < before else np.inf
+        alpha, p, previous_norm = self._last_step
+        return abs(alpha) * largest(p[:n]) / (previous_norm - self.norm) if self.norm < previous_norm else np.inf
 
     def _advance(self, alpha: float, p: Array, q: Array) -> None:
         """Update the iterate and its residual, ``x += alpha p`` and ``r -= alpha q``."""
         self._last_step = alpha, p, self.norm
-        self.norm = float(np.sqrt(self._stepped(alpha, p, q, self.x, self.r)))
+        self.norm = float(np.sqrt(self._step_along(alpha, p, q, self.x, self.r)))
 
-    def _stepped(self, alpha: float, p: Array, q: Array, x: Array, r: Array) -> float:
+    def _step_along(self, alpha: float, p: Array, q: Array, x: Array, r: Array) -> float:
         """Update arbitrary vectors, ``x += alpha p`` and ``r -= alpha q``; return the square of the norm of r."""
-        parallel_for(krylov_kernels.advance, len(self._sums), WORK_OF_NUMBER * CHUNK, alpha, p, q, x, r, self._sums)
+        parallel_for(krylov_kernels.advance, len(self._sums), WORK_PER_ENTRY * CHUNK, alpha, p, q, x, r, self._sums)
         return float(krylov_kernels.total(self._sums))
 
 
@@ -118,7 +118,7 @@ class ConjugateGradients(Iteration):
         if self._rz > 0.0:
             beta = -self._alpha * self.dot(self.q, self.z) / self._rz
         self._rz = rz
-        parallel_for(krylov_kernels.turn, len(self.p), WORK_OF_NUMBER, beta, self.z, self.p)
+        parallel_for(krylov_kernels.turn, len(self.p), WORK_PER_ENTRY, beta, self.z, self.p)
         multiply(self.p, self.q)
         curvature = self.dot(self.p, self.q)
         if not (rz > 0.0 and curvature > 0.0):
@@ -138,8 +138,8 @@ class ConjugateResiduals(Iteration):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
-        # Pairs of a search direction p and -A p, where A p has unit norm. With this sign, `_stepped` makes vectors orthogonal
-        # to A p.
+        # Pairs of a search direction p and -A p, where A p has unit norm. With this sign, `_step_along` makes vectors
+        # orthogonal to A p.
         self._stored: deque[tuple[Array, Array]] = deque()
         self._unused: list[tuple[Array, Array]] = []  # memory for directions and images
         self._failed = False  # whether the last step failed, see FAILED_REDUCTION
@@ -167,10 +167,10 @@ class ConjugateResiduals(Iteration):
         else:
             precondition(self.r, norm, z)
         multiply(z, q)
-        square = before = self.dot(q, q)
+        square = initial_square = self.dot(q, q)
         for direction, image in self._stored:
-            square = self._stepped(self.dot(q, image), direction, image, z, q)
-        if not square > np.finfo(float).eps ** 2 * before:
+            square = self._step_along(self.dot(q, image), direction, image, z, q)
+        if not square > np.finfo(float).eps ** 2 * initial_square:
             return False
         self._advance(self.dot(self.r, q) / square, z, q)
         self._store(z, q, float(np.sqrt(square)))

@@ -10,7 +10,7 @@ from fastcontact._jit.decorators import kernel
 # Length of the chunks.
 CHUNK = 4096
 # Work of kernels per entry, see `_jit.parallel.portions`.
-WORK_OF_NUMBER = 0.5
+WORK_PER_ENTRY = 0.5
 
 
 @kernel

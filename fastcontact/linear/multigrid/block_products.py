@@ -18,14 +18,14 @@ from typing import Any
 import numba.extending
 import numpy as np
 
-from fastcontact._jit.decorators import compiled
+from fastcontact._jit.decorators import jit_enabled
 from fastcontact.linear.multigrid import block_products_llvm
 
 Sizes = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 
 
 def row_times_plain(
-    indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, rows: tuple[int, ...], cols: tuple[int, ...]
+    indices: Any, entries: tuple[Any, ...], x: Any, begin: int, end: int, rows: tuple[int, ...], cols: tuple[int, ...]
 ) -> tuple[Any, ...]:
     """Return the product of one block row of a matrix with a vector, as a tuple of m numbers.
 
@@ -33,7 +33,7 @@ def row_times_plain(
     ----------
     indices : ndarray of int (n_blocks,)
         Block columns.
-    numbers : tuple of ndarray (n_blocks * m * n,)
+    entries : tuple of ndarray (n_blocks * m * n,)
         The numbers of the blocks, one block after the other. They may be split, see `symmetric_storage_kernels`.
     x : ndarray (n_columns * n,)
     begin, end : int
@@ -42,13 +42,13 @@ def row_times_plain(
         Tuples of m and n zeros: the size of a block.
     """
     m, n = len(rows), len(cols)
-    entries = slice(begin * m * n, end * m * n)
-    blocks = sum(part[entries].astype(x.dtype) for part in numbers).reshape(-1, m, n)
+    positions = slice(begin * m * n, end * m * n)
+    blocks = sum(array[positions].astype(x.dtype) for array in entries).reshape(-1, m, n)
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, n)[indices[begin:end]]))
 
 
 def row_times_both_ways_plain(
-    indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, row: int, factor: Any, y: Any,
+    indices: Any, entries: tuple[Any, ...], x: Any, begin: int, end: int, row: int, factor: Any, y: Any,
     rows: tuple[int, ...],
 ) -> tuple[Any, ...]:  # fmt: skip
     """Return the product of the blocks of a row with x, and add the products of the transposed blocks with x to y.
@@ -69,47 +69,47 @@ def row_times_both_ways_plain(
         Tuple of m zeros.
     """
     m, columns = len(rows), indices[begin:end]
-    blocks = sum(part[begin * m * m : end * m * m].astype(x.dtype) for part in numbers).reshape(-1, m, m)
+    blocks = sum(array[begin * m * m : end * m * m].astype(x.dtype) for array in entries).reshape(-1, m, m)
     y.reshape(-1, m)[columns] += np.einsum("kmn,m->kn", blocks, factor * x[row * m : (row + 1) * m])
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, m)[columns]))
 
 
 def add_product_plain(
-    to: Any, at: int, left: tuple[Any, ...], first: int, right: Any, second: int, sizes: Sizes
+    out: Any, start: int, left: tuple[Any, ...], left_start: int, right: Any, right_start: int, sizes: Sizes
 ) -> None:
-    """Add ``A B`` to the block (m, n), in double precision, that begins at ``to[at]``.
+    """Add ``A B`` to the block (m, n), in double precision, that begins at ``out[start]``.
 
     Parameters
     ----------
-    to : ndarray, at : int
-        Array that is changed in place, beginning at the position `at`.
-    left : tuple of ndarray, first : int
+    out : ndarray, start : int
+        Array that is changed in place, beginning at the position `start`.
+    left : tuple of ndarray, left_start : int
         Numbers of A (m, k), which may be split, and the position of the first one.
-    right : ndarray, second : int
+    right : ndarray, right_start : int
         Numbers of B (k, n), and the position of the first one.
     sizes : tuple of tuples
         Tuples of m, k and n zeros.
     """
     m, k, n = (len(size) for size in sizes)
-    A = sum(part[first : first + m * k].astype(float) for part in left).reshape(m, k)
-    to[at : at + m * n] += (A @ right[second : second + k * n].reshape(k, n).astype(float)).ravel()
+    A = sum(array[left_start : left_start + m * k].astype(float) for array in left).reshape(m, k)
+    out[start : start + m * n] += (A @ right[right_start : right_start + k * n].reshape(k, n).astype(float)).ravel()
 
 
 def add_transposed_plain(
-    to: Any, at: int, left: tuple[Any, ...], first: int, right: Any, second: int, sizes: Sizes
+    out: Any, start: int, left: tuple[Any, ...], left_start: int, right: Any, right_start: int, sizes: Sizes
 ) -> None:
     """Add ``A.T B`` with A (k, m); see `add_product_plain`."""
     m, k, n = (len(size) for size in sizes)
-    A = sum(part[first : first + k * m].astype(float) for part in left).reshape(k, m)
-    to[at : at + m * n] += (A.T @ right[second : second + k * n].reshape(k, n).astype(float)).ravel()
+    A = sum(array[left_start : left_start + k * m].astype(float) for array in left).reshape(k, m)
+    out[start : start + m * n] += (A.T @ right[right_start : right_start + k * n].reshape(k, n).astype(float)).ravel()
 
 
-def _kernel(vectorised: Any, plain: Any) -> Any:
+def _intrinsic_or_plain(vectorised: Any, plain: Any) -> Any:
     """Return the function that kernels call: an intrinsic that generates `vectorised`, or `plain` without compilation."""
-    return numba.extending.intrinsic(vectorised) if compiled() else plain
+    return numba.extending.intrinsic(vectorised) if jit_enabled() else plain
 
 
-row_times = _kernel(block_products_llvm.row_times, row_times_plain)
-row_times_both_ways = _kernel(block_products_llvm.row_times_both_ways, row_times_both_ways_plain)
-add_product = _kernel(block_products_llvm.add_product, add_product_plain)
-add_transposed = _kernel(block_products_llvm.add_transposed, add_transposed_plain)
+row_times = _intrinsic_or_plain(block_products_llvm.row_times, row_times_plain)
+row_times_both_ways = _intrinsic_or_plain(block_products_llvm.row_times_both_ways, row_times_both_ways_plain)
+add_product = _intrinsic_or_plain(block_products_llvm.add_product, add_product_plain)
+add_transposed = _intrinsic_or_plain(block_products_llvm.add_transposed, add_transposed_plain)

@@ -24,18 +24,18 @@ class Piece(NamedTuple):
     used: int
 
 
-def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
+def row_times(_context: Any, indices: Any, entries: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
     """Return the signature and the code generator of `block_products.row_times`."""
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return _all_blocks(_Row(context, builder, signature, args, len(rows), len(cols)), signature, args)
 
     sums = types.UniTuple(x.dtype, len(rows))
-    return sums(indices, numbers, x, types.intp, types.intp, rows, cols), code
+    return sums(indices, entries, x, types.intp, types.intp, rows, cols), code
 
 
 def row_times_both_ways(
-    _context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, row: Any, factor: Any, y: Any, rows: Any
+    _context: Any, indices: Any, entries: Any, x: Any, begin: Any, end: Any, row: Any, factor: Any, y: Any, rows: Any
 ) -> Any:
     """Return the signature and the code generator of `block_products.row_times_both_ways`."""
 
@@ -43,7 +43,7 @@ def row_times_both_ways(
         return _all_blocks(_RowBothWays(context, builder, signature, args, len(rows), len(rows)), signature, args)
 
     sums = types.UniTuple(x.dtype, len(rows))
-    return sums(indices, numbers, x, types.intp, types.intp, types.intp, x.dtype, y, rows), code
+    return sums(indices, entries, x, types.intp, types.intp, types.intp, x.dtype, y, rows), code
 
 
 def _all_blocks(row: _Row, signature: Any, args: Any) -> Any:
@@ -54,14 +54,14 @@ def _all_blocks(row: _Row, signature: Any, args: Any) -> Any:
     return row.context.make_tuple(row.builder, signature.return_type, row.sums())
 
 
-def add_product(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
+def add_product(_context: Any, out: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the signature and the code generator of `block_products.add_product`."""
-    return _product_adder(lambda r, t, _m, k: r * k + t, to, left, right, sizes)
+    return _product_adder(lambda r, t, _m, k: r * k + t, out, left, right, sizes)
 
 
-def add_transposed(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
+def add_transposed(_context: Any, out: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the signature and the code generator of `block_products.add_transposed`."""
-    return _product_adder(lambda r, t, m, _k: t * m + r, to, left, right, sizes)
+    return _product_adder(lambda r, t, m, _k: t * m + r, out, left, right, sizes)
 
 
 def _product_adder(index: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
@@ -76,12 +76,12 @@ def _product_adder(index: Callable[[int, int, int, int], int], to: Any, left: An
         out, right = (write.start(signature.args[number], args[number]) for number in (0, 4))
         left = write.starts(signature.args[2], args[2])
         rows_of_right = [
-            [write.numbers([right], args[5], t * n + piece.column, piece.width) for piece in pieces] for t in range(k)
+            [write.load([right], args[5], t * n + piece.column, piece.width) for piece in pieces] for t in range(k)
         ]
         for r in range(m):
-            factors = [write.numbers(left, args[3], index(r, t, m, k), 1) for t in range(k)]
+            factors = [write.load(left, args[3], index(r, t, m, k), 1) for t in range(k)]
             for p, piece in enumerate(pieces):
-                total = write.numbers([out], args[1], r * n + piece.column, piece.width)
+                total = write.load([out], args[1], r * n + piece.column, piece.width)
                 for t in range(k):
                     total = write.multiply_add(total, write.broadcast(factors[t], piece.width), rows_of_right[t][p])
                 builder.store(total, write.address(out, args[1], r * n + piece.column, piece.width), align=8)
@@ -114,7 +114,7 @@ class _Writer:
         first = self.builder.gep(start, [self.builder.add(at, at.type(column))])
         return self.builder.bitcast(first, self.kind(start.type.pointee, width).as_pointer())
 
-    def numbers(self, starts: list[Any], at: Any, column: int, width: int) -> Any:
+    def load(self, starts: list[Any], at: Any, column: int, width: int) -> Any:
         """Return the vector that begins at number ``at + column``; high and low parts of split numbers are added."""
         parts = [
             self.builder.load(
@@ -143,7 +143,7 @@ class _Writer:
 
     def add(self, start: Any, at: Any, column: int, width: int, vector: Any) -> None:
         """Add a vector to the numbers in memory that begin at number ``at + column``."""
-        total = self.builder.fadd(self.numbers([start], at, column, width), vector)
+        total = self.builder.fadd(self.load([start], at, column, width), vector)
         align = 4 if str(self.real) == "float" else 8
         self.builder.store(total, self.address(start, at, column, width), align=align)
 
@@ -196,18 +196,18 @@ class _Row(_Writer):
             column = builder.sext(column, self.offset)
         j = builder.mul(column, self.offset(n))
         at = builder.mul(k, self.offset(m * n))
-        x_j = self._triple(j) if self.shifted else [self.numbers([self.x], j, p.column, p.width) for p in self.pieces]
+        x_j = self._triple(j) if self.shifted else [self.load([self.x], j, p.column, p.width) for p in self.pieces]
         x_of_last = [self.shuffled(x_j[0], [0, 0, 1, 2])] if self.shifted else x_j
         for r in range(m):
             last = self.shifted and r == m - 1
             inputs = x_of_last if last else x_j
             for p, (piece, total, x) in enumerate(zip(self.pieces, self.totals[r], inputs, strict=True)):
-                numbers = self.numbers(self.data, at, r * n + piece.column - last, piece.width)
-                builder.store(self.multiply_add(builder.load(total), numbers, x), total)
-                self.process(r, p, numbers, last)
+                vector = self.load(self.data, at, r * n + piece.column - last, piece.width)
+                builder.store(self.multiply_add(builder.load(total), vector, x), total)
+                self.process(r, p, vector, last)
         self.finish(j)
 
-    def process(self, r: int, p: int, numbers: Any, last: bool) -> None:
+    def process(self, r: int, p: int, vector: Any, last: bool) -> None:
         """Process the numbers of row r and piece p of a block; `last` is true if they begin one number before the row."""
 
     def finish(self, j: Any) -> None:
@@ -233,8 +233,8 @@ class _Row(_Writer):
 
     def _triple(self, j: Any) -> list[Any]:
         """Return the three numbers of x from j on and an arbitrary fourth one, without reading beyond them."""
-        pair = self.shuffled(self.numbers([self.x], j, 0, 2), [0, 1, 0, 1])
-        return [self.builder.insert_element(pair, self.numbers([self.x], j, 2, 1), self.lane(2))]
+        pair = self.shuffled(self.load([self.x], j, 0, 2), [0, 1, 0, 1])
+        return [self.builder.insert_element(pair, self.load([self.x], j, 2, 1), self.lane(2))]
 
 
 class _RowBothWays(_Row):
@@ -244,17 +244,17 @@ class _RowBothWays(_Row):
         super().__init__(context, builder, signature, args, m, n)
         self.y = self.start(signature.args[7], args[7])
         first = builder.mul(args[5], self.offset(n))
-        self.x_of_row = [builder.fmul(args[6], self.numbers([self.x], first, r, 1)) for r in range(m)]
+        self.x_of_row = [builder.fmul(args[6], self.load([self.x], first, r, 1)) for r in range(m)]
         self.added: list[Any] = []
 
-    def process(self, r: int, p: int, numbers: Any, last: bool) -> None:
+    def process(self, r: int, p: int, vector: Any, last: bool) -> None:
         """Add row r of the block, times `factor` and the entry of x in row r of the block row."""
         if last:
-            numbers = self.shuffled(numbers, [1, 2, 3, 3])
+            vector = self.shuffled(vector, [1, 2, 3, 3])
         width = self.pieces[p].width
         if r == 0:
             self.added.append(self.zeros(width))
-        self.added[p] = self.multiply_add(self.added[p], numbers, self.broadcast(self.x_of_row[r], width))
+        self.added[p] = self.multiply_add(self.added[p], vector, self.broadcast(self.x_of_row[r], width))
 
     def finish(self, j: Any) -> None:
         """Add the sums to y, without touching other entries."""

@@ -25,17 +25,17 @@ class Border:
     ----------
     rows : csr_array (e, n)
         Matrix B.
-    right : ndarray (e,)
+    rhs : ndarray (e,)
         Right-hand sides c.
     compliance : csr_array (e, e)
         Compliance C.
     """
 
-    def __init__(self, rows: csr_array, right: Array, compliance: csr_array) -> None:
-        self.rows, self.right, self.compliance = rows, right, compliance
+    def __init__(self, rows: csr_array, rhs: Array, compliance: csr_array) -> None:
+        self.rows, self.rhs, self.compliance = rows, rhs, compliance
 
     def __len__(self) -> int:
-        return len(self.right)
+        return len(self.rhs)
 
     def prepare(self, diagonal: Array) -> None:
         """Factorise the preconditioner for the multipliers, given the diagonal (n,) of A [force / length]."""
@@ -47,23 +47,23 @@ class Border:
         # A small shift keeps the matrix nonsingular if equations are linearly dependent.
         self._factors = splu(csc_array(S + diags_array(ROUND_OFF * diagonal_of_S)))
 
-    def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
+    def product(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
         """Return the function that computes products with the bordered matrix.
 
         `multiply` is the function for A. `move_forces` moves forces (n,) from eliminated unknowns to the others, in place.
         """
         n = self.rows.shape[1]
 
-        def product(p: Array, q: Array) -> None:
+        def multiply_bordered(p: Array, q: Array) -> None:
             multiply(p[:n], q[:n])
             forces = self.rows.T @ p[n:]
             move_forces(forces)
             q[:n] -= forces
             q[n:] = self.stiffness * (self.rows @ p[:n] + self.compliance @ p[n:])
 
-        return product
+        return multiply_bordered
 
-    def precondition(self, precondition: Precondition) -> Precondition:
+    def preconditioner(self, precondition: Precondition) -> Precondition:
         """Return the preconditioner of the bordered matrix, given the preconditioner of A."""
         n = self.rows.shape[1]
 

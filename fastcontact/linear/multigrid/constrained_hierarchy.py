@@ -86,21 +86,21 @@ class ConstrainedHierarchy:
             finest.springs = springs.scaled(1.0, dtype)
             changes.append(SymmetricChange.of_springs(springs, len(self.A.rows)))
         if finest.P is None:
-            self.hierarchy.coarse.set(csc_array(sum(change.on_finest() for change in changes)))
+            self.hierarchy.coarse.set(csc_array(sum(change.matrix() for change in changes)))
             return
         diagonals = [change.diagonal() for change in changes]
         stiffened = None if elimination is None else self._stiffened(diagonals[0], elimination)
         self._change_diagonal(finest, sum_of_changes(*diagonals))
         if elimination is not None and stiffened is not None and len(stiffened):
             changes = self._exchange_roles(elimination, springs, stiffened, diagonals[1:])
-        change = sum_of_changes(*(change.on_coarse(finest.P) for change in changes))
+        change = sum_of_changes(*(change.galerkin_product(finest.P) for change in changes))
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
-                self.hierarchy.coarse.set(change.on_nodes(np.arange(level.n // change.size)).tocsc())
+                self.hierarchy.coarse.set(change.padded(np.arange(level.n // change.size)).tocsc())
                 return
             self._change_diagonal(level, change)
             level.change = change.rows(dtype)
-            change = change.coarser(level.P)
+            change = change.galerkin_product(level.P)
 
     def _restore(self) -> None:
         """Restore the levels to their state without equations and springs."""

@@ -16,26 +16,26 @@ from fastcontact.linear.multigrid.block_products import row_times
 
 
 @kernel
-def multiply(low, high, indptr, indices, numbers, x, factor, z_factor, z, y, rows, cols):
+def multiply(low, high, indptr, indices, entries, x, factor, z_factor, z, y, rows, cols):
     """Fill `y` (n_rows * m,) with ``z_factor * z + factor * A @ x``; z and y may be the same array.
 
     If `z_factor` is zero, z need not be initialised.
 
-    The `numbers` are the entries of A, as a tuple of one or two arrays, see `symmetric_storage_kernels`.
+    `entries` contains the entries of A, as a tuple of one or two arrays, see `symmetric_storage_kernels`.
     """
     m = len(rows)
     for i in range(low, high):
-        sums = row_times(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
+        sums = row_times(indices, entries, x, indptr[i], indptr[i + 1], rows, cols)
         for r in range(m):
             y[m * i + r] = (z_factor * z[m * i + r] if z_factor != 0.0 else z_factor) + factor * sums[r]
 
 
 @kernel
-def relax(low, high, inverse, r, first, second, d, x, rows, begin):
+def relax(low, high, inverse, r, first, second, d, x, rows, from_zero):
     """Perform a step of the Chebyshev iteration, ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
 
     `inverse` (n_rows * m * m,) contains the inverses of the diagonal blocks D. If `first` is zero, d need not be initialised.
-    If `begin` is true, the iteration starts at x = 0, and x need not be initialised (Saad, Iterative Methods for Sparse
+    If `from_zero` is true, the iteration starts at x = 0, and x need not be initialised (Saad, Iterative Methods for Sparse
     Linear Systems, 2003, algorithm 12.1).
     """
     m = len(rows)
@@ -48,24 +48,24 @@ def relax(low, high, inverse, r, first, second, d, x, rows, begin):
             if first != 0.0:
                 step += first * d[m * i + a]
             d[m * i + a] = step
-            if begin:
+            if from_zero:
                 x[m * i + a] = step
             else:
                 x[m * i + a] += step
 
 
 @kernel
-def subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
-    """Subtract ``A x`` from the block rows `numbers` of `y`, in place, for a matrix A of square blocks.
+def subtract_rows(low, high, row_numbers, indptr, indices, data, x, y, rows):
+    """Subtract ``A x`` from the block rows `row_numbers` of `y`, in place, for a matrix A of square blocks.
 
-    The `numbers` (n_rows,) must be distinct. `indices` contains the numbers of the blocks of x, and `data` the entries of A,
-    as `numbers` in `multiply`.
+    The `row_numbers` (n_rows,) must be distinct. `indices` contains the numbers of the blocks of x, and `data` the entries of
+    A, as `entries` in `multiply`.
     """
     m = len(rows)
     for i in range(low, high):
         sums = row_times(indices, data, x, indptr[i], indptr[i + 1], rows, rows)
         for r in range(m):
-            y[m * numbers[i] + r] -= sums[r]
+            y[m * row_numbers[i] + r] -= sums[r]
 
 
 @kernel

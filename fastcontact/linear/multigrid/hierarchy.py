@@ -125,13 +125,13 @@ class Hierarchy:
         # the Galerkin product with the prolongator that the cycle uses.
         columns, blocks = pattern.indices, np.empty(pattern.nnz * size * n_modes, self.dtype)
         parallel_for(
-            galerkin_kernels.smooth_prolongator, n, A.work_of_row, A.indptr, A.indices, A.storage, A.exact, level.inverse,
-            aggregate, tentative.ravel(), omega, pattern.indptr, columns, blocks, A.rows, cols,
+            galerkin_kernels.smooth_prolongator, n, A.work_of_row, A.indptr, A.indices, A.storage, A.exact_data,
+            level.inverse, aggregate, tentative.ravel(), omega, pattern.indptr, columns, blocks, A.rows, cols,
         )  # fmt: skip
         del tentative
         P = BlockMatrix(pattern.indptr, columns, blocks, A.rows, cols)
-        index = by_columns(P, n_coarse)
-        return P, transposed(P, index), product(A, P, index), coarse_modes
+        columns_of_P = column_pattern(P, n_coarse)
+        return P, transposed(P, columns_of_P), galerkin_product(A, P, columns_of_P), coarse_modes
 
     def __repr__(self) -> str:
         sizes = " -> ".join(str(level.n) for level in self.levels)
@@ -202,7 +202,7 @@ def graph(A: BlockMatrix) -> csr_matrix:
     return stored + stored.T.tocsr()
 
 
-def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
+def column_pattern(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
     """Return the pattern of P by columns.
 
     Returns
@@ -219,24 +219,24 @@ def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
     return columns.indptr, columns.indices, columns.data
 
 
-def transposed(P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
-    """Return the transpose of P; `index` is ``by_columns(P, n)``."""
-    blocks = P.data.reshape(-1, len(P.rows), len(P.cols))[index[2]].transpose(0, 2, 1)
-    return BlockMatrix(*index[:2], blocks.ravel(), P.cols, P.rows)
+def transposed(P: BlockMatrix, columns_of_P: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
+    """Return the transpose of P; `columns_of_P` is ``column_pattern(P, n)``."""
+    blocks = P.data.reshape(-1, len(P.rows), len(P.cols))[columns_of_P[2]].transpose(0, 2, 1)
+    return BlockMatrix(*columns_of_P[:2], blocks.ravel(), P.cols, P.rows)
 
 
-def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
-    """Return the Galerkin product ``P.T A P`` for a symmetric matrix A; `index` is ``by_columns(P, n)``."""
-    n_coarse = len(index[0]) - 1
-    count, near_count = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
+def galerkin_product(A: BlockMatrix, P: BlockMatrix, columns_of_P: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
+    """Return the Galerkin product ``P.T A P`` for a symmetric matrix A; `columns_of_P` is ``column_pattern(P, n)``."""
+    n_coarse = len(columns_of_P[0]) - 1
+    count, fine_count = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     work = len(A.indices) / max(1, n_coarse)
-    patterns = A.indptr, A.indices, P.indptr, P.indices, *index[:2]
-    parallel_for(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, near_count)
+    patterns = A.indptr, A.indices, P.indptr, P.indices, *columns_of_P[:2]
+    parallel_for(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, fine_count)
     indptr = pointers(count)
     columns = np.empty(indptr[-1], np.int32)
     out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)
     parallel_for(
-        galerkin_kernels.galerkin, n_coarse, work, A.indptr, A.indices, A.storage, A.exact, P.indptr, P.indices, P.data,
-        *index, indptr, int(near_count.max(initial=0)), columns, out, P.rows, P.cols,
+        galerkin_kernels.galerkin, n_coarse, work, A.indptr, A.indices, A.storage, A.exact_data, P.indptr, P.indices, P.data,
+        *columns_of_P, indptr, int(fine_count.max(initial=0)), columns, out, P.rows, P.cols,
     )  # fmt: skip
     return BlockMatrix(indptr, columns, out, P.cols, P.cols)

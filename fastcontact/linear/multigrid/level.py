@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from fastcontact._jit.parallel import NODES, parallel_for
+from fastcontact._jit.parallel import NODES_PER_CELL, parallel_for
 from fastcontact.arrays import AnyArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
@@ -100,21 +100,23 @@ class Level:
         cycle_kernels.invert_blocks(self.diagonal, len(self.A.rows), inverse)
         return Level(self.A, self.diagonal, inverse, self.bound, self.P, self.R)
 
-    def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
+    def relax(self, r: AnyArray, first: float, second: float, from_zero: bool = False) -> None:
         """Update `x` by a Chebyshev step (`cycle_kernels.relax`) for the residual r (n,), and set its eliminated unknowns."""
         real = r.dtype.type
-        self.chebyshev_step(r, real(first), real(second), self.d, self.x, begin)
+        self.chebyshev_step(r, real(first), real(second), self.d, self.x, from_zero)
         if self.free_motions is not None:
             self.free_motions.correct(r, second, self.d, self.x)
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
 
     def chebyshev_step(
-        self, r: AnyArray, first: np.floating, second: np.floating, d: AnyArray, x: AnyArray, begin: bool
+        self, r: AnyArray, first: np.floating, second: np.floating, d: AnyArray, x: AnyArray, from_zero: bool
     ) -> None:
         """Apply `cycle_kernels.relax` to the last step `d` (n,) and the iterate `x` (n,), in place, without corrections."""
         rows = self.A.rows
-        parallel_for(cycle_kernels.relax, self.n // len(rows), NODES, self.inverse, r, first, second, d, x, rows, begin)
+        parallel_for(
+            cycle_kernels.relax, self.n // len(rows), NODES_PER_CELL, self.inverse, r, first, second, d, x, rows, from_zero,
+        )  # fmt: skip
 
     def residual(self) -> None:
         """Fill `r` with ``b - A x``."""

@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
-from fastcontact.linear.elimination.pivot_order import RepeatedError
+from fastcontact.linear.elimination.pivot_order import DependenceError
 from fastcontact.linear.field_compliance import FieldCompliance, FieldEquations
 from fastcontact.linear.multigrid.border import Border
 from fastcontact.linear.protocol import MILD_CONTRAST, FrictionTerms, Monitor
@@ -45,18 +45,18 @@ class LoadedMultigrid(LoadedIteration):
 
         If equations are linearly dependent or have a full compliance matrix, the Delassus operator is formed.
         """
-        parts: _Parts | None = None
+        equations: _DividedEquations | None = None
         if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
                 if isinstance(C, FieldCompliance):
-                    parts = _FieldParts.of_points(B, c, C, self._solver.K.blocksize[0])
+                    equations = _DividedFieldEquations.from_points(B, c, C, self._solver.K.blocksize[0])
                 else:
-                    parts = self._parts(B, c, C, nodes)
-            except RepeatedError as repeated:
-                log.info("%s (the Delassus operator is formed instead)", repeated)
-        if parts is None:
+                    equations = self._divided(B, c, C, nodes)
+            except DependenceError as error:
+                log.info("%s (the Delassus operator is formed instead)", error)
+        if equations is None:
             return super().solve(B, c, C, guess, monitor, tolerance, nodes)
-        return self._solution(parts, c, guess, monitor, tolerance)
+        return self._solution(equations, c, guess, monitor, tolerance)
 
     @property
     def contrast(self) -> float:
@@ -72,69 +72,70 @@ class LoadedMultigrid(LoadedIteration):
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `LoadedNonsymmetric`."""
-        parts = self._parts(B, c, C, nodes, None if friction is None else friction.rows)
+        equations = self._divided(B, c, C, nodes, None if friction is None else friction.rows)
         if friction is None:
-            return self._solution(parts, c, guess, None, tolerance)
-        solver, elimination, springs = self._solver, parts.elimination, parts.springs
+            return self._solution(equations, c, guess, None, tolerance)
+        solver, elimination, springs = self._solver, equations.elimination, equations.springs
         springs = friction.springs if springs is None else springs.joined(friction.springs)
         f = self._f if friction.forces is None else self._f + friction.forces
-        f = parts.with_spring_forces(f, c)
+        f = equations.with_spring_forces(f, c)
         u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
-        return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
+        return u, equations.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
     def _solution(
-        self, parts: _Parts, c: Array, guess: Array | None, monitor: Monitor | None, tolerance: float | None
-    ) -> tuple[Array, Array]:
+        self, equations: _DividedEquations, c: Array, guess: Array | None, monitor: Monitor | None,
+        tolerance: float | None,
+    ) -> tuple[Array, Array]:  # fmt: skip
         """Return u (n,) [length] and the multipliers (m,) [force] of equations without friction."""
-        solver, elimination, springs = self._solver, parts.elimination, parts.springs
-        f, at_edge = parts.with_spring_forces(self._f, c), np.empty(0)
+        solver, elimination, springs = self._solver, equations.elimination, equations.springs
+        f, at_edge = equations.with_spring_forces(self._f, c), np.empty(0)
 
         def check(u: Array, multiplier: Array, error: float) -> bool:
             assert monitor is not None
-            return monitor(u, parts.multiplier(u, multiplier, c), error)
+            return monitor(u, equations.multiplier(u, multiplier, c), error)
 
-        if isinstance(parts, _FieldParts) and parts.field.edge.any():
-            field, edge = parts.field, parts.field.edge
-            border = Border(csr_array(field.rows[edge]), field.right[edge], field.compliance)
-            start = np.zeros(parts.C.P.shape[1])
+        if isinstance(equations, _DividedFieldEquations) and equations.field.edge.any():
+            field, edge = equations.field, equations.field.edge
+            border = Border(csr_array(field.rows[edge]), field.rhs[edge], field.compliance)
+            start = np.zeros(equations.C.P.shape[1])
             if guess is not None and len(self._at_edge) == len(start):
                 start = self._at_edge
-            arguments = f, elimination, springs, border, guess, start[field.edge_values] / field.units, tolerance
+            arguments = f, elimination, springs, border, guess, start[field.edge_values] / field.scales, tolerance
             u, at_edge = solver.bordered_solution(*arguments)
             self._at_edge = np.zeros(len(start))
-            self._at_edge[field.edge_values] = field.units * at_edge
+            self._at_edge[field.edge_values] = field.scales * at_edge
             f = f + border.rows.T @ at_edge
         else:
             u = solver.solution(f, elimination, guess, monitor and check, tolerance, springs)
         multipliers = np.concatenate([solver.multiplier(elimination, u, f, springs), at_edge])
-        return u, parts.multiplier(u, multipliers, c)
+        return u, equations.multiplier(u, multipliers, c)
 
-    def _parts(
+    def _divided(
         self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, force_rows: csr_array | None = None
-    ) -> _Parts:
+    ) -> _DividedEquations:
         """Return the equations, divided into eliminated ones and springs.
 
         `force_rows` (m, n) is the matrix F of the forces ``F.T @ multiplier`` on the unknowns; B by default.
 
         Raises
         ------
-        RepeatedError
+        DependenceError
             If equations without compliance are linearly dependent.
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
-            return _Parts.of(B, c, np.zeros(len(c)), np.ones(len(c), bool), nodes, size, force_rows)
+            return _DividedEquations.of(B, c, np.zeros(len(c)), np.ones(len(c), bool), nodes, size, force_rows)
         diagonal = self._solver.diagonal()
         flexibility = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         softness = B.multiply(B) @ flexibility
         try:
-            return _Parts.of(B, c, C, softness > LARGEST_STIFFNESS_RATIO * C, nodes, size, force_rows)
-        except RepeatedError:
-            return _Parts.of(B, c, C, C == 0.0, nodes, size, force_rows)
+            return _DividedEquations.of(B, c, C, softness > LARGEST_STIFFNESS_RATIO * C, nodes, size, force_rows)
+        except DependenceError:
+            return _DividedEquations.of(B, c, C, C == 0.0, nodes, size, force_rows)
 
 
 @dataclass(frozen=True, eq=False)
-class _Parts:
+class _DividedEquations:
     """Equations, divided into eliminated ones and springs.
 
     Attributes
@@ -155,11 +156,11 @@ class _Parts:
     def of(
         cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: Indices | None, size: int,
         force_rows: csr_array | None,
-    ) -> _Parts:  # fmt: skip
+    ) -> _DividedEquations:  # fmt: skip
         """Return the equations ``B u + C multiplier = c``, of which those marked in `stiff` (m,) are eliminated.
 
-        For parameters see `eliminate` and `LoadedMultigrid._parts`. A RepeatedError is raised if the eliminated equations are
-        linearly dependent.
+        For parameters see `eliminate` and `LoadedMultigrid._divided`. A DependenceError is raised if the eliminated equations
+        are linearly dependent.
         """
         rows, elimination = np.flatnonzero(stiff), None
         if len(rows):
@@ -190,7 +191,7 @@ class _Parts:
 
 
 @dataclass(frozen=True, eq=False)
-class _FieldParts(_Parts):
+class _DividedFieldEquations(_DividedEquations):
     """Equations at m points in the form of equations for a pressure field, and of springs; see `field_compliance`.
 
     The equations for the field are eliminated, except at the edge of the contact; those at the points are not. Springs at the
@@ -208,16 +209,16 @@ class _FieldParts(_Parts):
     C: FieldCompliance
 
     @classmethod
-    def of_points(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
+    def from_points(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _DividedFieldEquations:
         """Return the equations ``B u + C multiplier = c`` at the points.
 
-        `size` is the number of unknowns per node. A RepeatedError is raised if equations are linearly dependent.
+        `size` is the number of unknowns per node. A DependenceError is raised if equations are linearly dependent.
         """
-        field, elimination = C.of_field(B, c), None
+        field, elimination = C.field_equations(B, c), None
         if not field.edge.all():
             rows = csr_array(field.rows[~field.edge])
             nodes = abs(rows).argmax(axis=1).ravel() // size  # those of the largest entries
-            elimination = eliminate(rows, field.right[~field.edge], None, np.asarray(nodes, np.intp), size)
+            elimination = eliminate(rows, field.rhs[~field.edge], None, np.asarray(nodes, np.intp), size)
         springs = Springs(scaled(B, (C.stiffness > 0.0).astype(float)), C.stiffness)
         return cls(np.zeros(len(c), bool), elimination, springs, field, C)
 

@@ -53,14 +53,14 @@ class LocalChange:
         columns = self.nodes[self.blocks.indices].astype(np.int32)
         return self.nodes, self.blocks.indptr, columns, (self.blocks.data.astype(dtype).ravel(),)
 
-    def coarser(self, P: BlockMatrix) -> LocalChange:
+    def galerkin_product(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T change P``, the change of the next coarser matrix with the prolongator P."""
         coarse_nodes, P_rows = rows_of_prolongator(P, self.nodes)
         product = bsr_array(P_rows.T @ self.blocks @ P_rows)
         product.sort_indices()
         return LocalChange(coarse_nodes, product)
 
-    def on_nodes(self, nodes: Indices) -> bsr_array:
+    def padded(self, nodes: Indices) -> bsr_array:
         """Return `blocks` with zero rows and columns added for `nodes` (l,), an ascending superset of the nodes."""
         index = np.searchsorted(nodes, self.nodes)
         count = np.zeros(len(nodes), np.intp)
@@ -73,7 +73,7 @@ def sum_of_changes(change: LocalChange, *others: LocalChange) -> LocalChange:
     """Return the sum of several changes of the same matrix."""
     for other in others:
         nodes = np.union1d(change.nodes, other.nodes)
-        total = bsr_array(change.on_nodes(nodes) + other.on_nodes(nodes))
+        total = bsr_array(change.padded(nodes) + other.padded(nodes))
         total.sort_indices()
         change = LocalChange(nodes, total)
     return change
@@ -138,12 +138,12 @@ class SymmetricChange:
         row = entry_rows(rows)
         return np.asarray(row * rows.shape[1] + rows.indices, np.intp)
 
-    def on_finest(self) -> csc_array:
+    def matrix(self) -> csc_array:
         """Return the change as a matrix (n, n)."""
         half = csr_array(self.D.T @ self.G)
         return csc_array(half + half.T)
 
-    def on_coarse(self, P: BlockMatrix) -> LocalChange:
+    def galerkin_product(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T (D.T G + G.T D) P`` with the prolongator P."""
         nodes = np.unique(np.concatenate([self.D.indices, self.G.indices]) // self.size)
         coarse_nodes, P_rows = rows_of_prolongator(P, nodes)

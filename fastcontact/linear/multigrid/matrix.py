@@ -22,10 +22,10 @@ Storage = tuple[Numbers, Numbers, Numbers, int]
 
 # Storage in which every block of the pattern is stored.
 ALL_BLOCKS: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
-# Largest number of parts into which the rows of a symmetric matrix are divided, and smallest number of rows of a part. This
-# number of parts suffices for many threads, and the results of a part remain in the cache. With more parts, more blocks would
-# be stored twice.
-MAX_PARTS, MIN_ROWS = 32, 1024
+# Largest number of strips into which the rows of a symmetric matrix are divided, and smallest number of rows of a strip. This
+# number of strips suffices for many threads, and the results of a strip remain in the cache. With more strips, more blocks
+# would be stored twice.
+MAX_STRIPS, MIN_ROWS = 32, 1024
 
 
 @dataclass(eq=False)
@@ -58,7 +58,7 @@ class BlockMatrix:
     storage: Storage = ALL_BLOCKS
 
     @property
-    def exact(self) -> tuple[AnyArray, ...]:
+    def exact_data(self) -> tuple[AnyArray, ...]:
         """Arrays of the entries in full precision, as arguments of kernels: (data,), or (high, low) for a split matrix."""
         return (self.data,) if self.low is None else (self.data, self.low)
 
@@ -74,16 +74,16 @@ class BlockMatrix:
     def combine(self, factor: float, x: AnyArray, z_factor: float, z: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``z_factor * z + factor * A @ x``, in the precision of x; x and y must be different arrays."""
         real = x.dtype.type
-        numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
+        entries = (self.data,) if x.dtype == self.data.dtype else self.exact_data
         if self.storage is not ALL_BLOCKS:
             length, n = self.storage[3], len(self.indptr) - 1
             parallel_for(
-                symmetric_storage_kernels.multiply, -(-n // length), self.work_of_row * length, self.storage, numbers, x,
+                symmetric_storage_kernels.multiply, -(-n // length), self.work_of_row * length, self.storage, entries, x,
                 real(factor), real(z_factor), z, y, self.rows,
             )  # fmt: skip
             return
         parallel_for(
-            cycle_kernels.multiply, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices, numbers, x,
+            cycle_kernels.multiply, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices, entries, x,
             real(factor), real(z_factor), z, y, self.rows, self.cols,
         )  # fmt: skip
 
@@ -95,7 +95,7 @@ class BlockMatrix:
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
         size = len(self.rows)
-        blocks = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
+        blocks = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact_data]
         return np.asarray(sum(blocks[1:], blocks[0])).reshape(-1, size, size)
 
     def diagonal_part(self, data: AnyArray) -> AnyArray:
@@ -121,7 +121,7 @@ class BlockMatrix:
         starts = np.concatenate([[0], np.cumsum(count)])
         blocks = np.repeat(self.indptr[node] - starts[:-1], count) + np.arange(starts[-1])
         columns, data = self.indices[blocks][:, None] * size + np.arange(size), np.empty(starts[-1] * size)
-        symmetric_storage_kernels.rows_of(dofs, self.indptr, self.indices, self.storage, self.exact, size, data)
+        symmetric_storage_kernels.rows_of(dofs, self.indptr, self.indices, self.storage, self.exact_data, size, data)
         rows = csr_array((data, columns.ravel(), size * starts), shape=(len(dofs), (len(self.indptr) - 1) * size))
         rows.eliminate_zeros()
         return rows
@@ -130,7 +130,7 @@ class BlockMatrix:
         """Return a square matrix as a SciPy array, in double precision."""
         size, n = len(self.rows), len(self.indptr) - 1
         data = np.empty(len(self.indices) * size * size)
-        arrays = self.indptr, self.indices, self.storage, self.exact
+        arrays = self.indptr, self.indices, self.storage, self.exact_data
         parallel_for(symmetric_storage_kernels.expand, n, self.work_of_row, *arrays, size, data)
         return bsr_array((data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * (n * size,))
 
@@ -161,7 +161,7 @@ class ScaledMatrix:
     release : bool
         Whether the low parts may overwrite the numbers of K, which is empty afterwards. K and its parts are then never in
         memory at the same time, which reduces the peak memory with a million unknowns by a tenth.
-    like : ScaledMatrix, optional
+    source : ScaledMatrix, optional
         Matrix whose unit is reused, and also its storage if the pattern is the same. By default, the unit is chosen such that
         the largest stiffness is about one.
 
@@ -175,22 +175,22 @@ class ScaledMatrix:
     shape, blocksize : (int, int)
     """
 
-    def __init__(self, K: bsr_array, precision: str, release: bool = False, like: ScaledMatrix | None = None) -> None:
+    def __init__(self, K: bsr_array, precision: str, release: bool = False, source: ScaledMatrix | None = None) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self._store(K, precision, release, like)
+        self._store(K, precision, release, source)
 
-    def _store(self, K: bsr_array, precision: str, release: bool, like: ScaledMatrix | None = None) -> None:
+    def _store(self, K: bsr_array, precision: str, release: bool, source: ScaledMatrix | None = None) -> None:
         self.unit = 1.0
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        if like is None:
+        if source is None:
             size = range(K.blocksize[0])
             largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
             self.unit = float(0.5 ** np.round(np.log2(largest)))
         else:
-            self.unit = like.unit
-        self.scaled = _split_matrix(K, self.unit, release, None if like is None else like.scaled)
+            self.unit = source.unit
+        self.scaled = _split_matrix(K, self.unit, release, None if source is None else source.scaled)
 
     def change(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""
@@ -229,38 +229,38 @@ class ScaledMatrix:
         return self.scaled.absolute_product(u) / self.unit
 
 
-def _split_matrix(K: bsr_array, unit: float, release: bool, like: BlockMatrix | None) -> BlockMatrix:
+def _split_matrix(K: bsr_array, unit: float, release: bool, source: BlockMatrix | None) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`.
 
-    The storage of the matrix `like` is used if it has the same pattern.
+    The storage of the matrix `source` is used if it has the same pattern.
     """
     indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
-    size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
-    if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
+    size, entries = K.blocksize[0], K.data if K.data.base is None else K.data.base
+    if release and entries.size == K.data.size and entries.flags.owndata and entries.flags.c_contiguous:
         # Every number is read before it is overwritten. The numbers of K are invalid afterwards, and are therefore removed.
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
     else:
-        numbers = K.data.copy()
-    storage = ALL_BLOCKS if like is None else like.storage
-    if like is None or not (np.array_equal(indptr, like.indptr) and np.array_equal(indices, like.indices)):
+        entries = K.data.copy()
+    storage = ALL_BLOCKS if source is None else source.storage
+    if source is None or not (np.array_equal(indptr, source.indptr) and np.array_equal(indices, source.indices)):
         storage = symmetric_storage(indptr, indices)
-    n = numbers.size if storage is ALL_BLOCKS else len(storage[2]) * size * size
+    n = entries.size if storage is ALL_BLOCKS else len(storage[2]) * size * size
     high = np.empty(n, np.float32)
-    _store_parts(indptr, indices, storage, unit, numbers.reshape(-1), size * size, high)
+    _store_parts(indptr, indices, storage, unit, entries.reshape(-1), size * size, high)
     with contextlib.suppress(ValueError):  # another array references the memory, which then stays allocated
-        numbers.resize(((n + 1) // 2,))
-    low = numbers.reshape(-1).view(np.float32)[:n]
+        entries.resize(((n + 1) // 2,))
+    low = entries.reshape(-1).view(np.float32)[:n]
     return BlockMatrix(indptr, indices, high, (0,) * size, (0,) * size, low, storage)
 
 
 def _store_parts(
-    indptr: Numbers, indices: Numbers, storage: Storage, unit: float, numbers: AnyArray, block_size: int, high: AnyArray
+    indptr: Numbers, indices: Numbers, storage: Storage, unit: float, entries: AnyArray, block_size: int, high: AnyArray
 ) -> None:
     """Fill `high` with the high parts of the stored blocks, of `block_size` numbers each, times `unit`.
 
-    `numbers` contains the numbers of all blocks. Its beginning is overwritten by the low parts.
+    `entries` contains the entries of all blocks. Its beginning is overwritten by the low parts.
     """
-    start, low = indptr if storage is ALL_BLOCKS else storage[0], numbers.view(np.float32)
+    start, low = indptr if storage is ALL_BLOCKS else storage[0], entries.view(np.float32)
     end, n, max_blocks = 0, len(indptr) - 1, int(np.diff(indptr).max(initial=0))
     while end < n:  # Up to row `safe_end`, low parts overwrite only numbers that have been read.
         first = end
@@ -269,20 +269,20 @@ def _store_parts(
         work = len(indices) / n if end == safe_end else 0
         parallel_for(
             symmetric_storage_kernels.store_rows, end - first, work, first, max_blocks, indptr, indices, storage, unit,
-            numbers, block_size, high, low,
+            entries, block_size, high, low,
         )  # fmt: skip
 
 
 def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     """Return the storage of a symmetric matrix.
 
-    The storage is `ALL_BLOCKS` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the parts.
+    The storage is `ALL_BLOCKS` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the strips.
     """
     n = len(indptr) - 1
-    length = max(MIN_ROWS, -(-n // MAX_PARTS))
+    length = max(MIN_ROWS, -(-n // MAX_STRIPS))
     row = np.repeat(np.arange(n, dtype=np.int32), np.diff(indptr))
-    same_part = row // length == indices // length
-    below, above, diagonal = same_part & (indices < row), same_part & (indices > row), indices == row
+    same_strip = row // length == indices // length
+    below, above, diagonal = same_strip & (indices < row), same_strip & (indices > row), indices == row
     ascending = (indices[1:] > indices[:-1]) | (row[1:] > row[:-1])
     transposed = np.sort(indices[below].astype(np.int64) * n + row[below])
     symmetric = np.array_equal(transposed, row[above].astype(np.int64) * n + indices[above])

@@ -33,13 +33,13 @@ from fastcontact.linear.multigrid.hierarchy import Hierarchy
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
 from fastcontact.linear.multigrid.reduced import ReducedOperator, multiplier
 from fastcontact.linear.protocol import MILD_CONTRAST, TOLERANCE, Counters, Monitor
-from fastcontact.linear.springs import ALIKE, Springs
+from fastcontact.linear.springs import MAX_DIFFERENCE, Springs
 
 log = logging.getLogger("fastcontact")
 MAX_ITERATIONS = 1000
 # Largest number of columns of K^-1 that are computed, each as the solution of one linear system. For more columns, a
 # factorisation is cheaper.
-MOST_COLUMNS = 300
+MAX_COLUMNS = 300
 # Number of iterations between two calls of a monitor.
 MONITOR_INTERVAL = 2
 # Number of iterations before the first call of a monitor if `_contrast` is large, because the errors of soft parts are not
@@ -129,14 +129,14 @@ class Multigrid:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
         n, earlier = K.shape[0], self._earlier_hierarchy
         self.K = ScaledMatrix(K, self.precision, release, None if earlier is None else self.K)
-        self._modes = rigid_modes.astype(np.float32)  # for `build_in`; single precision suffices
+        self._modes = rigid_modes.astype(np.float32)  # for `rebuild`; single precision suffices
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
         self._build(rigid_modes, earlier)
-        self.columns = InverseColumns(n, self._inverse_entries, MOST_COLUMNS)
+        self.columns = InverseColumns(n, self._inverse_entries, MAX_COLUMNS)
 
-    def near(self) -> Self:
+    def copy_for_similar_matrix(self) -> Self:
         """Return a copy, to be prepared for a similar matrix, whose hierarchy will reuse the coarser levels.
 
         Once the iteration converges slowly with reused levels, all hierarchies are built anew.
@@ -164,7 +164,7 @@ class Multigrid:
         self._add_work(COST_OF_CHANGE)
         self.constrain(reduced.elimination, reduced.springs)
 
-    def build_in(self, precision: str) -> None:
+    def rebuild(self, precision: str) -> None:
         """Rebuild the hierarchy in a different precision."""
         self.precision = precision
         del self._constrained, self.hierarchy  # so that there are never two hierarchies in memory
@@ -184,7 +184,7 @@ class Multigrid:
         if elimination is not self._reduced.elimination or springs is not self._reduced.springs:
             sparse = elimination and elimination.with_sparse_weights()
             old_springs = self._hierarchy_springs
-            same_springs = old_springs is None if springs is None else springs.alike(old_springs)
+            same_springs = old_springs is None if springs is None else springs.is_similar(old_springs)
             if not (same_springs and _nearly_equal(sparse, self._hierarchy_equations, self._constrained.stiffening)):
                 self._change_hierarchy(sparse, springs)
                 self._add_work(COST_OF_CHANGE)
@@ -252,7 +252,7 @@ class Multigrid:
                 self._count()
             else:
                 attempts += 1
-                self._strengthen(attempts)
+                self._make_definite(attempts)
                 self._begin(cg, f)
         return self._reduced.displacement(cg.x).copy()
 
@@ -295,8 +295,8 @@ class Multigrid:
         self._begin(iteration, f)
         # If some parts are much stiffer than others, the tolerance of the solver permits large errors in the soft parts,
         # which later pairings would reduce only slowly.
-        aim = tolerance / self._contrast * scale
-        self._reduce(iteration, limit, scale, self._reduced.multiply, self.precondition, aim)
+        target_norm = tolerance / self._contrast * scale
+        self._iterate(iteration, limit, scale, self._reduced.multiply, self.precondition, target_norm)
         return self._reduced.displacement(iteration.x).copy()
 
     def bordered_solution(
@@ -337,30 +337,30 @@ class Multigrid:
             iteration.x[:n] = guess
         x, r, iteration.x[n:] = iteration.x[:n], iteration.r[:n], start
         self._reduced.begin(x, f + border.rows.T @ start, r)
-        iteration.r[n:] = border.stiffness * (border.right - border.rows @ x - border.compliance @ start)
+        iteration.r[n:] = border.stiffness * (border.rhs - border.rows @ x - border.compliance @ start)
         iteration.start()
 
         def move_forces(forces: Array) -> None:
             if elimination is not None:
                 elimination.move_forces(forces)
 
-        multiply = border.multiply(self._reduced.multiply, move_forces)
-        limit, precondition = self._stopping_residual(tolerance or 0.0), border.precondition(self.precondition)
-        self._reduce(iteration, limit, scale, multiply, precondition)
+        multiply = border.product(self._reduced.multiply, move_forces)
+        limit, precondition = self._stopping_residual(tolerance or 0.0), border.preconditioner(self.precondition)
+        self._iterate(iteration, limit, scale, multiply, precondition)
         return x.copy(), iteration.x[n:].copy()
 
-    def _reduce(
+    def _iterate(
         self, iteration: ConjugateResiduals, tolerance: float, scale: float, multiply: Multiply,
-        precondition: Precondition, aim: float = np.inf,
+        precondition: Precondition, target_norm: float = np.inf,
     ) -> None:  # fmt: skip
         """Iterate until the residual is at most the `tolerance` times `scale` [force].
 
         An initial guess may satisfy this tolerance although the forces in a small contact area are still inaccurate. Some
         further iterations are therefore performed, see WARM_REDUCTION. They continue until the norm of the residual is
-        `aim`, if this is smaller.
+        `target_norm`, if this is smaller.
         """
         limit = tolerance * scale
-        count, target = 0, max(min(limit, WARM_REDUCTION * iteration.norm, aim), WARM_RESIDUAL * limit)
+        count, target = 0, max(min(limit, WARM_REDUCTION * iteration.norm, target_norm), WARM_RESIDUAL * limit)
         initial_norm = iteration.norm
         if initial_norm > WARM_REDUCTION * self._unfinished_norm and self._constrained.stiffening > MILD_CONTRAST:
             self._max_warm_iterations = min(2 * self._max_warm_iterations, STORED_DIRECTIONS)
@@ -408,17 +408,17 @@ class Multigrid:
             self._diagonal = self.K.diagonal()
         return self._diagonal
 
-    def _strengthen(self, times: int) -> None:
+    def _make_definite(self, attempt: int) -> None:
         """Make the preconditioner positive definite, by larger bounds or, in the last attempt, by double precision."""
         if self._reuses_coarse_levels:
             self._build_anew()
             return
-        if times < MAX_RAISES or self.precision == "double":
+        if attempt < MAX_RAISES or self.precision == "double":
             self.hierarchy.bounds = [BOUND_FACTOR * bound for bound in self.hierarchy.bounds]
             return
         log.info("multigrid: single precision is insufficient for this matrix; the cycle continues in double precision")
         reduced = self._reduced
-        self.build_in("double")
+        self.rebuild("double")
         self.constrain(reduced.elimination, reduced.springs)
 
     def _begin(self, iteration: Iteration, f: Array) -> None:
@@ -474,4 +474,4 @@ def _nearly_equal(new: Elimination | None, old: Elimination | None, stiffening: 
     if new is None or old is None or not np.array_equal(new.pivots, old.pivots):
         return new is old
     difference = float(np.abs((new.weights - old.weights).data).max(initial=0.0))
-    return difference <= ALIKE / np.sqrt(max(1.0, stiffening))
+    return difference <= MAX_DIFFERENCE / np.sqrt(max(1.0, stiffening))

@@ -24,7 +24,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import restore_tolerance, tighten
-from fastcontact.linear.factor_solver import AFFORDABLE
+from fastcontact.linear.factor_solver import MAX_FACTORISED_DOFS
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import ReducedOperator
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid, StallError, TooManyIterationsError
@@ -109,10 +109,10 @@ class Amg(Multigrid, LinearSolver):
 
         See `LinearSolver.snapshot`. The keys are names in result files and must not be changed.
         """
-        instead = None if self.replacement is None else {"why": self.replacement_reason, **self.replacement.snapshot()}
+        replacement = self.replacement and {"why": self.replacement_reason, **self.replacement.snapshot()}
         return {
             "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
-            "asked": list(self.columns.requests), **self._constrained_by(), "instead": instead,
+            "asked": list(self.columns.requests), **self._constrained_by(), "instead": replacement,
             "lasting": self._reuses_levels[0],
         }  # fmt: skip
 
@@ -126,15 +126,15 @@ class Amg(Multigrid, LinearSolver):
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
         """See `LinearSolver.put_back`."""
-        if (instead := snapshot.get("instead")) is not None:
-            (self.replacement or self._factorise(instead["why"])).put_back(instead)
+        if (replacement := snapshot.get("instead")) is not None:
+            (self.replacement or self._factorise(replacement["why"])).put_back(replacement)
             return
         if self.replacement is not None:  # The factorisation replaced multigrid after the snapshot was taken.
             self._factor_solver, self.replacement, self.replacement_reason = self.replacement, None, ""
         self._reuses_levels[0] = snapshot.get("lasting", True)
         restore_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
-            self.build_in(snapshot["precision"])
+            self.rebuild(snapshot["precision"])
         self.columns.put_back(snapshot["asked"])
         current, saved = self._constrained_by(), {name: snapshot.get(name) for name in ("tied", "springs")}
         if not all(_equal(current[name], saved[name]) for name in saved):
@@ -145,40 +145,40 @@ class Amg(Multigrid, LinearSolver):
             self._change_hierarchy(equations, springs)
         self.hierarchy.bounds = snapshot["bounds"]
 
-    def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
-        """Replace multigrid by a factorisation, for the reason `stalled`.
+    def give_up(self, error: StallError | TooManyColumnsError) -> None:
+        """Replace multigrid by a factorisation because of an `error`.
 
         Raises
         ------
         StallError, TooManyColumnsError
-            The error `stalled`, if the matrix is too large to be factorised.
+            The given `error`, if the matrix is too large to be factorised.
         """
         if not self._may_factorise:
-            raise stalled
-        if isinstance(stalled, TooManyIterationsError):
-            why = (
+            raise error
+        if isinstance(error, TooManyIterationsError):
+            reason = (
                 f"multigrid gave up and a factorisation replaced it, which costs more memory: {self.iteration_limit} "
                 f"iterations in one load step take longer than a factorisation of {self.K.shape[0]} unknowns"
             )
         else:
-            why = f"multigrid gave up and a factorisation replaced it, which costs more time and memory: {stalled}"
-        self._factorise(why)
+            reason = f"multigrid gave up and a factorisation replaced it, which costs more time and memory: {error}"
+        self._factorise(reason)
 
     @property
     def _may_factorise(self) -> bool:
         """Whether the matrix is small enough to be factorised."""
-        return bool(self.K.shape[0] <= AFFORDABLE[self.K.blocksize[0]])
+        return bool(self.K.shape[0] <= MAX_FACTORISED_DOFS[self.K.blocksize[0]])
 
-    def _factorise(self, why: str) -> Direct:
-        """Replace multigrid by a factorisation, for the reason `why`, and return the direct solver."""
+    def _factorise(self, reason: str) -> Direct:
+        """Replace multigrid by a factorisation, for the given `reason`, and return the direct solver."""
         if self._factor_solver is None:
-            log.warning("%s", why)
+            log.warning("%s", reason)
             self._factor_solver = Direct()
             self._factor_solver.counters = self.counters
             self._factor_solver.prepare(self.K.restored(), self._modes.astype(float), self._involved)
         else:
             self._factor_solver.put_back({"asked": [], "loads": []})
-        self.replacement_reason, self.replacement = why, self._factor_solver
+        self.replacement_reason, self.replacement = reason, self._factor_solver
         # From now on the tolerance is that of the direct solver.
         self.original_tolerance = self.tolerance if self.original_tolerance is None else self.original_tolerance
         self.tolerance = self.replacement.tolerance
@@ -207,8 +207,8 @@ def _with_fallback(method: Callable[..., Any]) -> Callable[..., Any]:
         if self._solver.replacement is None:
             try:
                 return method(self, *args, **options)
-            except (StallError, TooManyColumnsError) as stalled:
-                self._solver.give_up(stalled)
+            except (StallError, TooManyColumnsError) as error:
+                self._solver.give_up(error)
         return getattr(self._factored, method.__name__)(*args, **options)
 
     return wrapper
@@ -232,8 +232,8 @@ class _Loaded(LoadedMultigrid):
             raise ConvergenceError("with a factorisation, the friction problem is solved with the Delassus operator")
         try:
             return super().solve_nonsymmetric(*args, **options)
-        except StallError as stalled:
-            self._solver.give_up(stalled)
+        except StallError as error:
+            self._solver.give_up(error)
             raise
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.linear.cholesky.factorisation import fill_reducing, singular
+from fastcontact.linear.cholesky.factorisation import fill_reducing_order, singular_matrix_error
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 from fastcontact.linear.factor_solver import FactorSolver
 
@@ -26,17 +26,17 @@ class Cholmod(FactorSolver):
     def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         from kvxopt import cholmod, matrix
 
-        factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # rows are columns
+        factor = factorise(lower_triangle(K.tocsr()), matrix(fill_reducing_order(K, last)))  # rows are columns
         # CHOLMOD may reorder independent branches of the elimination tree, which does not affect the factors.
         position = np.empty(self.n, np.intp)
         position[_elimination_order(factor, self.n)] = np.arange(self.n)
         start, rows, values = (np.asarray(array).ravel() for array in cholmod.getfactor(factor).CCS)
         diagonal = values[start[:-1]]
         values /= np.repeat(diagonal, np.diff(start))
-        return SymmetricFactors(by_supernodes(start, rows, values), diagonal**2, position, last)
+        return SymmetricFactors(grouped_by_supernodes(start, rows, values), diagonal**2, position, last)
 
 
-def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:
+def grouped_by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:
     """Return a Cholesky factor with the row indices stored once per supernode, given its columns with ascending rows.
 
     Column j + 1 belongs to the supernode of column j if j + 1 is the first row of column j below the diagonal, and if column
@@ -44,11 +44,11 @@ def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Arr
     below the diagonal are contained in those of its parent, the column of its first row below the diagonal.
     """
     entries = np.diff(start)
-    continues = np.zeros(len(entries), bool)
-    continues[1:] = entries[:-1] == entries[1:] + 1
-    previous = np.flatnonzero(continues) - 1
-    continues[1 + previous] = rows[start[previous] + 1] == previous + 1
-    first = np.append(np.flatnonzero(~continues), len(entries))
+    in_supernode = np.zeros(len(entries), bool)
+    in_supernode[1:] = entries[:-1] == entries[1:] + 1
+    previous = np.flatnonzero(in_supernode) - 1
+    in_supernode[1 + previous] = rows[start[previous] + 1] == previous + 1
+    first = np.append(np.flatnonzero(~in_supernode), len(entries))
     last = np.zeros(len(entries), bool)
     last[first[1:] - 1] = True
     shared = np.repeat(last, entries)
@@ -67,7 +67,7 @@ def lower_triangle(K: csr_array) -> Any:
     return spmatrix(matrix(K.data[lower]), rows, columns, K.shape)
 
 
-def factorised(A: Any, order: Any) -> Any:
+def factorise(A: Any, order: Any) -> Any:
     """Return the Cholesky factor of a `lower_triangle` A, with the unknowns eliminated in a given order."""
     from kvxopt import cholmod
 
@@ -77,7 +77,7 @@ def factorised(A: Any, order: Any) -> Any:
         factor = cholmod.symbolic(A, order)
         cholmod.numeric(A, factor)
     except ArithmeticError as error:
-        raise singular() from error
+        raise singular_matrix_error() from error
     finally:
         cholmod.options.clear()
         cholmod.options.update(options)
@@ -92,7 +92,7 @@ def _elimination_order(factor: Any, n: int) -> Indices:
     try:
         cholmod.solve(factor, numbers, sys=7)  # only permutes `numbers` to the order of elimination
     except ArithmeticError as error:  # For small matrices, CHOLMOD detects a zero pivot only when it solves a system.
-        raise singular() from error
+        raise singular_matrix_error() from error
     return np.array(numbers).ravel().astype(np.intp)
 
 

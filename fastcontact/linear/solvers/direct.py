@@ -35,11 +35,11 @@ class Direct(FactorSolver):
             symbolic = self._symbolic[self._of_tangents] = SymbolicFactors(K, last, self._of_tangents)
         return symbolic.factors(K)
 
-    def near(self) -> Self:
+    def copy_for_similar_matrix(self) -> Self:
         """See `LinearSolver.near`."""
-        new = super().near()
-        new._of_tangents = True
-        return new
+        copied = super().copy_for_similar_matrix()
+        copied._of_tangents = True
+        return copied
 
 
 SOLVER = Direct

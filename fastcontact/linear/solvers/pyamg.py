@@ -103,11 +103,11 @@ class Pyamg(LinearSolver):
         v0 = None if guess is None else guess - t
         if v0 is not None and elimination is not None:
             v0[elimination.pivots] = 0.0
-        v, failed = cg(
+        v, info = cg(
             self._A, rhs, v0, rtol=max(self.tolerance, tolerance or 0.0), maxiter=MAX_ITERATIONS,
             M=self._hierarchy.aspreconditioner(), callback=self._count,
         )  # fmt: skip
-        if failed:
+        if info:
             raise ConvergenceError(
                 f"conjugate gradients with pyamg do not reach the tolerance {self.tolerance:.1e}: use amg or direct"
             )

@@ -139,10 +139,10 @@ class Element:
         return self.corner_shape(self.nodes) @ np.linalg.pinv(self.corner_shape(points))
 
 
-def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -> Element:
+def quadratic(name: str, linear: Element, functions: Functions, **arguments: Any) -> Element:
     """Return a quadratic element, whose facets are those of the `linear` element with their mid-side and centre nodes.
 
-    `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions and their derivatives, and `others` are
+    `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions and their derivatives, and `arguments` are
     further arguments of `Element`.
     """
     nodes, shape, gradient = functions
@@ -152,11 +152,11 @@ def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -
         midpoints = (corners + np.roll(corners, -1, axis=0)) / 2
         on_facet = [np.flatnonzero((nodes == node).all(axis=1)) for node in (*midpoints, corners.mean(axis=0))]
         facets.append(tuple(dict.fromkeys((*facet, *np.concatenate(on_facet).tolist()))))
-    others |= {"quadratic": name, "corner_element": linear}
-    return Element(name, nodes, linear.edges, tuple(facets), shape, gradient, **others)
+    arguments |= {"quadratic": name, "corner_element": linear}
+    return Element(name, nodes, linear.edges, tuple(facets), shape, gradient, **arguments)
 
 
-def with_middles(linear: Element) -> Array:
+def with_midpoints(linear: Element) -> Array:
     """Return the nodes of a linear element, followed by the midpoints of its edges, as an array (n_nodes, dim) [-]."""
     return np.vstack([linear.nodes, linear.nodes[np.array(linear.edges)].sum(axis=1) / 2])
 
@@ -165,15 +165,15 @@ def serendipity(box: Element) -> Functions:
     """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a serendipity square or cube.
 
     The function of a mid-side node with the coordinates X is the product of 1 - x^2 for the coordinate x along its edge,
-    where X is 0, and of (1 + x X) / 2 for the rest. The function of a corner is its linear function times the sum of all
-    x X minus dim - 1 (Zienkiewicz and Taylor).
+    where X is 0, and of (1 + x X) / 2 for the other coordinates. The function of a corner is its linear function times
+    ``s - (dim - 1)``, where s is the sum of x X over all coordinates (Zienkiewicz and Taylor).
     """
-    nodes, dim = with_middles(box), box.dim
-    corners, middles = np.split(nodes, [box.n_nodes])
+    nodes, dim = with_midpoints(box), box.dim
+    corners, midpoints = np.split(nodes, [box.n_nodes])
 
     def factors(xi: Array) -> Array:
         x = xi[:, None]
-        return np.where(middles == 0, 1 - x * x, (1 + x * middles) / 2)
+        return np.where(midpoints == 0, 1 - x * x, (1 + x * midpoints) / 2)
 
     def shape(xi: Array) -> Array:
         corner = box.shape(xi) * (xi @ corners.T - (dim - 1))
@@ -182,7 +182,7 @@ def serendipity(box: Element) -> Functions:
     def gradient(xi: Array) -> Array:
         excess = (xi @ corners.T - (dim - 1))[:, :, None]
         corner = box.gradient(xi) * excess + box.shape(xi)[:, :, None] * corners
-        slopes = np.where(middles == 0, -2 * xi[:, None], middles / 2)
+        slopes = np.where(midpoints == 0, -2 * xi[:, None], midpoints / 2)
         derivatives = [np.where(np.arange(dim) == k, slopes, factors(xi)).prod(axis=2) for k in range(dim)]
         return np.concatenate([corner, np.stack(derivatives, axis=2)], axis=1)
 
@@ -211,7 +211,7 @@ def product(nodes: Array, first: Element, second: Element) -> Functions:
     return nodes, shape, gradient
 
 
-def with_mid_nodes(simplex: Element) -> Functions:
+def quadratic_simplex(simplex: Element) -> Functions:
     """Return the nodes (n_nodes, dim) [-], shape functions and derivatives of the quadratic simplex with mid-side nodes."""
     first, second = np.array(simplex.edges).T
 
@@ -224,4 +224,4 @@ def with_mid_nodes(simplex: Element) -> Functions:
         along_edges = 4 * (L[:, first] * dL[:, second] + L[:, second] * dL[:, first])
         return np.concatenate([(4 * L - 1) * dL, along_edges], axis=1)
 
-    return with_middles(simplex), shape, gradient
+    return with_midpoints(simplex), shape, gradient

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, quadratic, with_middles
+from fastcontact.mesh.elements._element import Array, Element, quadratic, with_midpoints
 from fastcontact.mesh.quadrature import gauss_line
 
 
@@ -34,6 +34,6 @@ LINE2 = Element(
     quadrature=gauss_line(2), meshio="line", med="SE2", vtk=3, quadratic="line3",
 )  # fmt: skip
 LINE3 = quadratic(
-    "line3", LINE2, (with_middles(LINE2), shape_3, gradient_3), quadrature=gauss_line(3), meshio="line3", med="SE3", vtk=21
+    "line3", LINE2, (with_midpoints(LINE2), shape_3, gradient_3), quadrature=gauss_line(3), meshio="line3", med="SE3", vtk=21
 )  # fmt: skip
 ELEMENTS = LINE2, LINE3

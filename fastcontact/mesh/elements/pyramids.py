@@ -9,14 +9,14 @@ test is passed. The rule of code_aster has 10 points.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, quadratic, with_middles
+from fastcontact.mesh.elements._element import Array, Element, quadratic, with_midpoints
 from fastcontact.mesh.elements.quadrangles import EDGES, QUAD4
 from fastcontact.mesh.quadrature import conical_pyramid, pyramid_5
 
 X, Y = QUAD4.nodes.T
 
 
-def collapsed(xi: Array) -> tuple[Array, Array, Array]:
+def collapsed_coordinates(xi: Array) -> tuple[Array, Array, Array]:
     """Return a = x / (1 - z), b = y / (1 - z) and 1 - z, each (m, 1) [-], at `xi` (m, 3) [-]; a = b = 0 at the apex."""
     x, y, t = xi[:, 0:1], xi[:, 1:2], 1 - xi[:, 2:3]
     apex = np.abs(t) < 1e-14
@@ -26,13 +26,13 @@ def collapsed(xi: Array) -> tuple[Array, Array, Array]:
 
 def shape(xi: Array) -> Array:
     """Return the shape functions (m, 5) [-] at `xi` (m, 3) [-]."""
-    a, b, t = collapsed(xi)
+    a, b, t = collapsed_coordinates(xi)
     return np.column_stack([t * (1 + X * a) * (1 + Y * b) / 4, xi[:, 2]])
 
 
 def gradient(xi: Array) -> Array:
     """Return the derivatives (m, 5, 3) [-] at `xi` (m, 3) [-]."""
-    a, b, _ = collapsed(xi)
+    a, b, _ = collapsed_coordinates(xi)
     base = np.stack([X * (1 + Y * b), Y * (1 + X * a), X * Y * a * b - 1], axis=2) / 4
     apex = np.tile([0.0, 0.0, 1.0], (len(xi), 1, 1))
     return np.concatenate([base, apex], axis=1)
@@ -51,7 +51,7 @@ ALONG_X = np.array([True, False, True, False])
 
 def shape_13(xi: Array) -> Array:
     """Return the shape functions (m, 13) [-] at `xi` (m, 3) [-]."""
-    (a, b, t), z = collapsed(xi), xi[:, 2:3]
+    (a, b, t), z = collapsed_coordinates(xi), xi[:, 2:3]
     corner = shape(xi)[:, :4] * (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)
     base = t * t / 2 * np.where(ALONG_X, (1 - a * a) * (1 + SIDES * b), (1 - b * b) * (1 + SIDES * a))
     return np.column_stack([corner, z * (2 * z - 1), base, 4 * z * shape(xi)[:, :4]])
@@ -59,7 +59,7 @@ def shape_13(xi: Array) -> Array:
 
 def gradient_13(xi: Array) -> Array:
     """Return the derivatives (m, 13, 3) [-] at `xi` (m, 3) [-]."""
-    (a, b, t), z = collapsed(xi), xi[:, 2:3]
+    (a, b, t), z = collapsed_coordinates(xi), xi[:, 2:3]
     N, dN = shape(xi)[:, :4, None], gradient(xi)[:, :4]
     factor = (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)[:, :, None]
     corner = dN * factor + N * np.column_stack([X, Y, np.zeros(4)])
@@ -80,7 +80,7 @@ def _base_edges(a: Array, b: Array, t: Array, axes: tuple[int, int]) -> Array:
 
 
 PYRAMID13 = quadratic(
-    "pyramid13", PYRAMID5, (with_middles(PYRAMID5), shape_13, gradient_13), quadrature=conical_pyramid(3),
+    "pyramid13", PYRAMID5, (with_midpoints(PYRAMID5), shape_13, gradient_13), quadrature=conical_pyramid(3),
     meshio="pyramid13", med="P13", vtk=27, dilatation=0,
 )  # fmt: skip
 ELEMENTS = PYRAMID13, PYRAMID5

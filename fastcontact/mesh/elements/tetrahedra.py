@@ -6,7 +6,7 @@ quadratic elements five.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, quadratic, with_mid_nodes
+from fastcontact.mesh.elements._element import Array, Element, quadratic, quadratic_simplex
 from fastcontact.mesh.quadrature import tetrahedron_1, tetrahedron_5
 
 
@@ -26,6 +26,6 @@ TET4 = Element(
     meshio="tetra", med="TE4", vtk=10, quadratic="tet10",
 )  # fmt: skip
 TET10 = quadratic(
-    "tet10", TET4, with_mid_nodes(TET4), quadrature=tetrahedron_5(), meshio="tetra10", med="T10", vtk=24, dilatation=0
-)
+    "tet10", TET4, quadratic_simplex(TET4), quadrature=tetrahedron_5(), meshio="tetra10", med="T10", vtk=24, dilatation=0
+)  # fmt: skip
 ELEMENTS = TET10, TET4

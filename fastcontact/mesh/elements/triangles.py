@@ -6,7 +6,7 @@ elements six, because three points do not suffice at an axis of symmetry.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, quadratic, with_mid_nodes
+from fastcontact.mesh.elements._element import Array, Element, quadratic, quadratic_simplex
 from fastcontact.mesh.quadrature import triangle_1, triangle_6
 
 EDGES = ((0, 1), (1, 2), (2, 0))
@@ -27,6 +27,6 @@ TRI3 = Element(
     quadrature=triangle_1(), meshio="triangle", med="TR3", vtk=5, quadratic="tri6",
 )  # fmt: skip
 TRI6 = quadratic(
-    "tri6", TRI3, with_mid_nodes(TRI3), quadrature=triangle_6(), meshio="triangle6", med="TR6", vtk=22, dilatation=0
+    "tri6", TRI3, quadratic_simplex(TRI3), quadrature=triangle_6(), meshio="triangle6", med="TR6", vtk=22, dilatation=0
 )
 ELEMENTS = TRI3, TRI6

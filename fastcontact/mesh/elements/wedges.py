@@ -8,7 +8,7 @@ in the opposite direction.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, product, quadratic, with_middles
+from fastcontact.mesh.elements._element import Array, Element, product, quadratic, with_midpoints
 from fastcontact.mesh.elements.lines import LINE2, LINE3
 from fastcontact.mesh.elements.triangles import TRI3, TRI6
 from fastcontact.mesh.quadrature import gauss_line, tensor_product, triangle_3_sides, triangle_7
@@ -49,8 +49,8 @@ def gradient_15(xi: Array) -> Array:
 
 
 WEDGE15 = quadratic(
-    "wedge15", WEDGE6, (with_middles(WEDGE6), shape_15, gradient_15), quadrature=tensor_product(triangle_7(), gauss_line(3)),
-    meshio="wedge15", med="P15", vtk=26, dilatation=0,
+    "wedge15", WEDGE6, (with_midpoints(WEDGE6), shape_15, gradient_15), meshio="wedge15", med="P15", vtk=26, dilatation=0,
+    quadrature=tensor_product(triangle_7(), gauss_line(3)),
 )  # fmt: skip
 CENTRES = np.column_stack([TRI6.nodes[3:], np.zeros(3)])
 WEDGE18 = quadratic(

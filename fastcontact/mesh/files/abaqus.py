@@ -32,8 +32,8 @@ def check_readable(path: Path) -> None:
                 f"'{path}' defines the {option} '{repeated[0]}' in several places, of which meshio keeps one: "
                 "define it once, or convert the mesh to .med"
             )
-    with_set = [bool(options.get("ELSET")) for keyword, options in sections if keyword == "ELEMENT"]
-    if sorted(with_set, reverse=True) != with_set:
+    has_set = [bool(options.get("ELSET")) for keyword, options in sections if keyword == "ELEMENT"]
+    if sorted(has_set, reverse=True) != has_set:
         raise FileError(
             f"'{path}' has an *ELEMENT section with ELSET after one without, and meshio assigns this set to wrong cells: "
             "name a set in each section, or define the sets by *ELSET"
@@ -42,9 +42,9 @@ def check_readable(path: Path) -> None:
 
 def _keyword(line: str) -> tuple[str, dict[str, str]]:
     """Return the keyword of a line and its options, with upper-case names."""
-    first, *rest = line.lstrip("*").split(",")
-    pairs = (word.partition("=") for word in rest)
-    return first.strip().upper(), {name.strip().upper(): value.strip() for name, _, value in pairs}
+    keyword, *options = line.lstrip("*").split(",")
+    pairs = (word.partition("=") for word in options)
+    return keyword.strip().upper(), {name.strip().upper(): value.strip() for name, _, value in pairs}
 
 
 def append_cell_sets(path: Path, mesh: Mesh) -> None:

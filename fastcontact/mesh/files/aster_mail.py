@@ -31,7 +31,7 @@ NODE_ORDER = {
     "HEXA27": (*_BRICK_EDGES, 24, 22, 21, 23, 20, 25, 26),
 }
 COORDINATES = {"COOR_2D": 2, "COOR_3D": 3}
-IGNORED = ("TITRE",)
+IGNORED_KEYWORDS = ("TITRE",)
 
 Word = tuple[str, int]
 
@@ -109,7 +109,7 @@ class _Content:
             if not words:
                 raise self._error(line, f"{keyword} has no name")
             self._groups[keyword].setdefault(words[0][0], []).extend(words[1:])
-        elif keyword not in IGNORED:
+        elif keyword not in IGNORED_KEYWORDS:
             keywords = ", ".join([*COORDINATES, *KINDS, *self._groups])
             raise self._error(line, f"{keyword[:40]} is not known; a mesh has {keywords}")
 

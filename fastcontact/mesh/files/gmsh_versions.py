@@ -17,7 +17,7 @@ GROUPS_OF_ENTITY = 7
 MOST_WORDS = 200
 
 
-def readable(path: Path, folder: Path) -> Path:
+def readable_file(path: Path, folder: Path) -> Path:
     """Return the path of a file that meshio can read: `path`, or a converted copy in the temporary `folder`."""
     with open(path, "rb") as file:
         first, second = (file.readline(256).strip() for _ in range(2))

@@ -29,14 +29,16 @@ NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.val
 # MED orders the face centres as bottom, the four sides in turn, top; fastcontact as -x, +x, -y, +y, bottom, top.
 _FACES_OF_H27 = dict(zip(range(20, 26), (24, 22, 21, 23, 20, 25)))
 NODE_ORDER["H27"] = tuple(_FACES_OF_H27.get(node, node) for node in NODE_ORDER["H27"])
+# Sizes of the names of meshes and of components in MED files [bytes].
 NAME_SIZE = 64
 COMPONENT_SIZE = 16
 NO_PROFILE = "MED_NO_PROFILE_INTERNAL"
 NO_STEP = -1
-FLOAT64 = 6
+FLOAT64 = 6  # code of the type of a field
 AXES = ("X", "Y", "Z")
 # Suffixes of MED files, including code_aster's for meshes and results.
 MED_SUFFIXES = (".med", ".mmed", ".rmed")
+# Sizes of the names of groups and of families [bytes].
 GROUP_NAME_SIZE = 80
 FAMILY_NAME_SIZE = 64
 # Largest number of folder levels between a mesh and its families. MED has one, with separate folders for points and cells.
@@ -59,7 +61,7 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
     If the file contains several meshes, `mesh_name` is read; if the mesh has several time steps, the first one is read.
     """
     with open_hdf5(path) as file:
-        name = _chosen_mesh(file, path, mesh_name)
+        name = _mesh_to_read(file, path, mesh_name)
         try:
             mesh, omitted = _read_mesh(file, file["ENS_MAA"][name])
         except MeshError as error:
@@ -69,7 +71,7 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
         return MedContent(mesh, name, ".".join(version), omitted["vertex"])
 
 
-def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
+def _mesh_to_read(file: Any, path: PathLike, mesh_name: str | None) -> str:
     """Return the name of the mesh to read. Raises FileError if there is no mesh, or several and no `mesh_name`."""
     names = list(file["ENS_MAA"]) if "ENS_MAA" in file else []
     if not names:
@@ -143,8 +145,8 @@ def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
     # MED 2 stores faces and edges in separate folders (FAC, ARE), and later versions store all cells in the folder MAI.
     folders = [step[name] for name in ("MAI", "FAC", "ARE") if name in step]
     entries = [entry for folder in folders for entry in folder.items()]
-    foreign = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
-    check_kinds(foreign, elements.BY_MED)
+    unknown = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
+    check_kinds(unknown, elements.BY_MED)
     for code, entry in entries:
         if "NOD" not in entry:
             raise MeshError(f"its {code} cells have no nodal connectivity: write the mesh with nodal connectivity")
@@ -206,11 +208,11 @@ def _tracking_order(enabled: bool) -> Iterator[None]:
     import h5py
 
     settings = h5py.get_config()
-    before, settings.track_order = settings.track_order, enabled
+    previous, settings.track_order = settings.track_order, enabled
     try:
         yield
     finally:
-        settings.track_order = before
+        settings.track_order = previous
 
 
 def _set(group: Any, **attributes: Any) -> None:
@@ -458,7 +460,7 @@ def family_members(numbers: AnyArray, families: Families) -> dict[str, Indices]:
             warn(f"{len(rows)} cells or points belong to {remark}")
         for name in families.get(number, ()):
             members_by_group.setdefault(name, []).append(rows)
-    return {name: np.unique(np.concatenate(parts)) for name, parts in members_by_group.items()}
+    return {name: np.unique(np.concatenate(blocks)) for name, blocks in members_by_group.items()}
 
 
 def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[Numbers, Families]:
@@ -471,15 +473,15 @@ def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[
     combinations: list[tuple[str, ...]] = [()]
     for name, rows in groups.items():
         # Only the labels of members change, so that the cost is proportional to the size of the groups, not of the mesh.
-        earlier, position = np.unique(labels[rows], return_inverse=True)
+        old_labels, position = np.unique(labels[rows], return_inverse=True)
         labels[rows] = len(combinations) + position
-        combinations += [(*combinations[label], name) for label in earlier]
-    used, compact = np.unique(np.append(labels, 0), return_inverse=True)
-    families = {sign * number: combinations[label] for number, label in enumerate(used.tolist()) if number}
+        combinations += [(*combinations[label], name) for label in old_labels]
+    used_labels, numbers = np.unique(np.append(labels, 0), return_inverse=True)
+    families = {sign * number: combinations[label] for number, label in enumerate(used_labels.tolist()) if number}
     empty = tuple(name for name, rows in groups.items() if not len(rows))
     if empty:
-        families[sign * len(used)] = empty
-    return (sign * compact[:-1]).astype(np.int32), families
+        families[sign * len(used_labels)] = empty
+    return (sign * numbers[:-1]).astype(np.int32), families
 
 
 def write_families(folder: Any, families: Families) -> None:

@@ -19,10 +19,10 @@ from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.mesh import Mesh
 
 # Largest distance of coincident points of a file and of a mesh, relative to the size of the mesh.
-COINCIDENT = 1e-6
-OVER = ("cells", "points")
+LENGTH_TOLERANCE = 1e-6
+ENTITIES = ("cells", "points")
 # Largest difference of equal times, relative to the latest time of a file.
-SAME_TIME = 1e-9
+TIME_TOLERANCE = 1e-9
 VTKHDF_SUFFIXES = (".vtkhdf", ".hdf")
 
 
@@ -73,8 +73,8 @@ def read_field(
     >>> E = fc.read_field(mesh, "scan.vtu", "E")  # doctest: +SKIP
     >>> model.add_material(fc.LinearElastic(E=E, nu=0.3))  # doctest: +SKIP
     """
-    if over not in OVER:
-        raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")
+    if over not in ENTITIES:
+        raise FileError(f"over must be {' or '.join(ENTITIES)}, not '{over}'")
     name = f"field '{field}' of '{file}'"
     cells, file_field = _cells(mesh, groups), read_file_field(file, field, over)
     if instant is None and len(file_field.values) != 1:
@@ -83,10 +83,10 @@ def read_field(
     if over == "cells":
         centres = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
         numbers = np.arange(len(centres))
-        rows, _ = _nearest(file_field, centres, numbers, mesh, ("cell", "cells"), name)
+        rows, _ = _nearest_rows(file_field, centres, numbers, mesh, ("cell", "cells"), name)
         return _check_complete(file_field.values[:, rows], centres, numbers, "cell", name)[row][:, None]
     points = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
-    values = at_points_of(file_field, mesh, points, name)[row]
+    values = nodal_values(file_field, mesh, points, name)[row]
     return np.where(np.isfinite(values), values, values[points].mean())
 
 
@@ -109,13 +109,13 @@ def row_of(instant: float, times: Array | None, name: str, error: type[Fastconta
     if times is None:
         raise error(f"{name} has no times: omit instant")
     row = int(np.abs(times - instant).argmin())
-    if abs(times[row] - instant) > SAME_TIME * np.abs(times).max():
-        nearest = f"the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
-        raise error(f"{name} has no instant {instant:g}, {nearest}")
+    if abs(times[row] - instant) > TIME_TOLERANCE * np.abs(times).max():
+        available = f"the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
+        raise error(f"{name} has no instant {instant:g}, {available}")
     return row
 
 
-def at_points_of(field: FileField, mesh: Mesh, points: Indices, name: str) -> Array:
+def nodal_values(field: FileField, mesh: Mesh, points: Indices, name: str) -> Array:
     """Return the values (n_instants, n_points) of a field at the given points (k,) of a mesh, with NaN at other points.
 
     If the file has the points of the mesh in the same order, values are assigned by number, otherwise by position.
@@ -129,7 +129,7 @@ def at_points_of(field: FileField, mesh: Mesh, points: Indices, name: str) -> Ar
     if field.positions is None and field.values.shape[1] != mesh.n_points:
         raise MeshError(f"{name} has {field.values.shape[1]} points and no coordinates, the mesh has {mesh.n_points}")
     if field.positions is not None and not _same_points(field.positions, mesh):
-        rows, tolerance = _nearest(field, mesh.points[points], points, mesh, ("point", "nodes"), name)
+        rows, tolerance = _nearest_rows(field, mesh.points[points], points, mesh, ("point", "nodes"), name)
         _check_unique(field, mesh.points[points], tolerance, name)
     values = np.full((len(field.values), mesh.n_points), np.nan)
     values[:, points] = _check_complete(field.values[:, rows], mesh.points[points], points, "point", name)
@@ -146,10 +146,10 @@ def _same_points(positions: Array, mesh: Mesh) -> bool:
     if len(positions) != mesh.n_points:
         return False
     difference = np.abs(_in_3d(positions) - _in_3d(mesh.points)).max(initial=0.0)
-    return bool(difference <= COINCIDENT * np.ptp(mesh.points, axis=0).max())
+    return bool(difference <= LENGTH_TOLERANCE * np.ptp(mesh.points, axis=0).max())
 
 
-def _nearest(
+def _nearest_rows(
     field: FileField, positions: Array, numbers: Indices, mesh: Mesh, nouns: tuple[str, str], name: str
 ) -> tuple[Indices, float]:
     """Return the rows (n,) of a field at positions (n, dim) in a mesh, and the tolerance of the distance [length].
@@ -158,7 +158,7 @@ def _nearest(
     name of such an item, and the name of the items on which the field should be written.
     """
     assert field.positions is not None
-    tolerance = COINCIDENT * float(np.ptp(mesh.points, axis=0).max())
+    tolerance = LENGTH_TOLERANCE * float(np.ptp(mesh.points, axis=0).max())
     distance, rows = nearest(_in_3d(field.positions), _in_3d(positions))
     far = np.flatnonzero(~(distance <= tolerance))
     if len(far):
@@ -181,13 +181,13 @@ def _check_complete(values: Array, positions: Array, numbers: Indices, noun: str
 def _check_unique(field: FileField, positions: Array, tolerance: float, name: str) -> None:
     """Raise MeshError if the file has different values at coincident points at one of the positions (n, dim)."""
     assert field.positions is not None
-    near, index = pairs_within(_in_3d(field.positions), _in_3d(positions), np.full(len(positions), tolerance))
+    row, index = pairs_within(_in_3d(field.positions), _in_3d(positions), np.full(len(positions), tolerance))
     ends = np.searchsorted(index, np.arange(len(positions) + 1))
     for point, first, end in zip(positions, ends[:-1], ends[1:], strict=True):
-        members = near[first:end]
-        if len(members) > 1 and np.ptp(field.values[:, members], axis=1).max() > 0.0:
+        rows = row[first:end]
+        if len(rows) > 1 and np.ptp(field.values[:, rows], axis=1).max() > 0.0:
             raise MeshError(
-                f"{name} has {len(members)} different values at {_in_3d(point[None])[0]}, where bodies touch: write it on "
+                f"{name} has {len(rows)} different values at {_in_3d(point[None])[0]}, where bodies touch: write it on "
                 "the nodes of this mesh, in their order"
             )
 
@@ -252,7 +252,7 @@ def read_temperatures(
     fields, times = [], []
     for path in files:
         file_field = read_file_field(path, field, "points")
-        values = at_points_of(file_field, mesh, points, f"field '{field}' of '{path}'")
+        values = nodal_values(file_field, mesh, points, f"field '{field}' of '{path}'")
         if len(files) > 1 and len(values) > 1:
             raise ModelError(
                 f"'{path}' has {len(values)} instants: each of several files must have one, or give a single file"
@@ -286,14 +286,14 @@ def _read_vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, 
             return None, field[None], points
         n_points, n_steps = len(points), int(grid["Steps"].attrs["NSteps"])
         times = np.asarray(values(grid["Steps"], "Values"), np.float64)[:n_steps]
-        first = np.asarray(values(grid["Steps/PointDataOffsets"], name), np.int64)[:n_steps]
+        starts = np.asarray(values(grid["Steps/PointDataOffsets"], name), np.int64)[:n_steps]
         if len(np.unique(values(grid, "NumberOfPoints"))) != 1 or int(values(grid, "NumberOfPoints")[0]) != n_points:
             raise FileError(f"'{path}' has a mesh that changes or has several parts: write one mesh for all instants")
         check_size(f"field '{name}' of '{path}'", (n_steps, n_points), file)
-        if len(first) and (first.min() < 0 or first.max() + n_points > len(field)):
+        if len(starts) and (starts.min() < 0 or starts.max() + n_points > len(field)):
             raise FileError(f"field '{name}' of '{path}' has fewer numbers than its steps need: write the file again")
-        steps = np.array([field[start : start + n_points] for start in first])
-        return times, steps.reshape(len(first), n_points, *field.shape[1:]), points
+        steps = np.array([field[start : start + n_points] for start in starts])
+        return times, steps.reshape(len(starts), n_points, *field.shape[1:]), points
 
 
 def _cell_centres(path: Path, name: str, grid: Any, n_values: int, points: Array) -> Array:

@@ -78,11 +78,11 @@ def _block(content: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, o
     kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
     groups: dict[str, AnyArray] = {}
-    for key, parts in content["cell_data"].items():
+    for key, arrays in content["cell_data"].items():
         if key in TAGS:
-            _add_to(groups, _groups_of_tags(parts[index], dim, content["field_data"]))
+            _add_to(groups, _groups_of_tags(arrays[index], dim, content["field_data"]))
         else:
-            _add_to(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(parts[index])})
+            _add_to(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(arrays[index])})
     for name, sets in content["cell_sets"].items():
         if not name.startswith("gmsh:") and index < len(sets):
             _add_to(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
@@ -141,20 +141,20 @@ def build_mesh(
         coordinates = np.asarray(points, np.float64)
     except (TypeError, ValueError):
         raise MeshError("its coordinates are not numbers: check that the file is complete") from None
-    joined = [block for block in merged(blocks) if len(block.nodes)]
-    given = [block for block in joined if block.kind != VERTEX]
-    solid = list(map(without_duplicates, given)) if repeats else given
-    vertices = [block for block in joined if block.kind == VERTEX]
-    if not solid:
+    nonempty = [block for block in merge_blocks(blocks) if len(block.nodes)]
+    original = [block for block in nonempty if block.kind != VERTEX]
+    cell_blocks = list(map(without_duplicates, original)) if repeats else original
+    vertices = [block for block in nonempty if block.kind == VERTEX]
+    if not cell_blocks:
         raise MeshError("the mesh has no cells: nothing can be computed on points alone")
-    cell_groups: Groups = {name: np.empty(0, np.intp) for name in names} | _renumbered(solid)
+    cell_groups: Groups = {name: np.empty(0, np.intp) for name in names} | _renumbered(cell_blocks)
     all_point_groups = {name: np.asarray(members, np.intp) for name, members in point_groups.items()}
     for block in vertices:
-        for name in _add_vertices(all_point_groups, block, solid):
+        for name in _add_vertices(all_point_groups, block, cell_blocks):
             cell_groups.pop(name, None)
-    dim = max(elements.get(block.kind).dim for block in solid)
-    cells = {block.kind: block.nodes for block in solid}
-    n_duplicates = sum(len(block.nodes) - len(cells[block.kind]) for block in given)
+    dim = max(elements.get(block.kind).dim for block in cell_blocks)
+    cells = {block.kind: block.nodes for block in cell_blocks}
+    n_duplicates = sum(len(block.nodes) - len(cells[block.kind]) for block in original)
     omitted = {"vertex": sum(len(block.nodes) for block in vertices), "duplicate": n_duplicates}
     return Mesh(_without_flat_z(coordinates, dim), cells, cell_groups, all_point_groups), omitted
 
@@ -168,7 +168,7 @@ def check_kinds(unknown: Mapping[str, int], known: Iterable[str]) -> None:
         raise MeshError(f"it has {kinds}, which fastcontact does not know: use only {', '.join(sorted(known))}")
 
 
-def merged(blocks: Iterable[Block]) -> list[Block]:
+def merge_blocks(blocks: Iterable[Block]) -> list[Block]:
     """Return one block for each kind, in the order in which the kinds first appear."""
     by_kind: dict[str, list[Block]] = {}
     for block in blocks:
@@ -191,15 +191,15 @@ def _renumbered(blocks: list[Block]) -> Groups:
     for block, start in zip(blocks, np.cumsum([0, *(len(block.nodes) for block in blocks)]), strict=False):
         for name, rows in block.groups.items():
             groups.setdefault(name, []).append(np.asarray(rows, np.intp) + start)
-    return {name: np.concatenate(parts) for name, parts in groups.items()}
+    return {name: np.concatenate(arrays) for name, arrays in groups.items()}
 
 
-def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> list[str]:
+def _add_vertices(point_groups: Groups, block: Block, cell_blocks: list[Block]) -> list[str]:
     """Convert groups of vertex cells to groups of points, and return the names of the groups that have no other cells."""
     converted = []
     for name, rows in block.groups.items():
         points = block.nodes[rows, 0]
-        nodes_of_cells = [other.nodes[other.groups[name]].ravel() for other in solid if name in other.groups]
+        nodes_of_cells = [cells.nodes[cells.groups[name]].ravel() for cells in cell_blocks if name in cells.groups]
         if not nodes_of_cells:
             point_groups[name] = np.union1d(point_groups.get(name, points[:0]), points)
             converted.append(name)

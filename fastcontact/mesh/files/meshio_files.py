@@ -40,16 +40,16 @@ FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
 HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
 
 # Largest length of meshio's output in a message.
-LONGEST = 300
-KEEPS_ALL = "write a .med file to keep them"
-USUAL = (".med", ".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".mesh")
+LONGEST_OUTPUT = 300
+LOSSLESS_FORMAT = "write a .med file to keep them"
+COMMON_FORMATS = ".med, .msh, .vtu, .vtk, .inp, .xdmf, .mesh or another format of meshio"
 OTHER_FORMATS = "write .med, .vtu or .msh instead"
 
 
 def _error(action: str, path: Path, reason: str) -> FileError:
     """Return the error for an `action` of meshio that failed."""
     reason = " ".join(reason.split())
-    reason = reason if len(reason) <= LONGEST else f"{reason[:LONGEST]}..."
+    reason = reason if len(reason) <= LONGEST_OUTPUT else f"{reason[:LONGEST_OUTPUT]}..."
     remedy = "check the file, or convert it to .med" if action == "read" else OTHER_FORMATS
     return FileError(f"meshio cannot {action} '{path}' ({reason}): {remedy}")
 
@@ -80,7 +80,7 @@ def _format(path: Path, writing: bool) -> str:
     names = next((formats[suffix] for suffix in suffixes if suffix in formats), None)
     if names is None:
         similar = difflib.get_close_matches(path.suffix, formats, n=1, cutoff=0.7)
-        remedy = f"did you mean '{similar[0]}'?" if similar else f"use {', '.join(USUAL)} or another format of meshio"
+        remedy = f"did you mean '{similar[0]}'?" if similar else f"use {COMMON_FORMATS}"
         raise FileError(f"'{path}': unknown mesh file suffix '{path.suffix}': {remedy}")
     if "gmsh" not in names:
         return str(names[0])
@@ -136,7 +136,7 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
     file_format = _format(path, writing=False)
     if file_format == "gmsh":
         with tempfile.TemporaryDirectory() as folder:
-            content = _read_content(path, gmsh_versions.readable(path, Path(folder)), file_format)
+            content = _read_content(path, gmsh_versions.readable_file(path, Path(folder)), file_format)
     else:
         content = _read_content(path, path, file_format)
     _log("read", path, content["output"])
@@ -166,8 +166,8 @@ def files_of(path: Path) -> list[Path]:
     """Return a mesh file and all files that are read with it. Raises FileError if an XDMF file cannot be read."""
     if path.suffix.lower() in (".xdmf", ".xmf"):
         return [path, *(reference for reference, _ in _references(path))]
-    other = {".node": ".ele", ".ele": ".node"}.get(path.suffix)  # TetGen's pair of files
-    return [path, path.with_suffix(other)] if other else [path]
+    partner = {".node": ".ele", ".ele": ".node"}.get(path.suffix)  # TetGen's pair of files
+    return [path, path.with_suffix(partner)] if partner else [path]
 
 
 def _references(path: Path) -> Iterator[tuple[Path, str]]:
@@ -230,7 +230,7 @@ def _arguments(mesh: Mesh, file_format: str) -> dict[str, Any]:
         return {**content, "point_sets": dict(mesh.point_groups)}
     n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
     if n_groups:
-        warn(f"{file_format} files have no named groups: {n_groups} groups are left out; {KEEPS_ALL}")
+        warn(f"{file_format} files have no named groups: {n_groups} groups are left out; {LOSSLESS_FORMAT}")
     return content
 
 
@@ -273,7 +273,7 @@ def _add_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     if lost:
         warn(
             f"Gmsh files of version 2.2 store one group per cell: {sum(lost.values())} memberships of the groups "
-            f"{', '.join(lost)} are left out; {KEEPS_ALL}"
+            f"{', '.join(lost)} are left out; {LOSSLESS_FORMAT}"
         )
     blocks = np.split(tags, list(mesh.offsets.values())[1:])
     cells, blocks = _add_vertices(content["cells"], blocks, mesh.point_groups, field_data)
@@ -290,7 +290,7 @@ def _add_vertices(
     if repeated:
         warn(
             f"{len(repeated)} groups of points have the name of a group of cells ({', '.join(repeated)}), which "
-            f"Gmsh files cannot tell apart: they are left out; {KEEPS_ALL}"
+            f"Gmsh files cannot tell apart: they are left out; {LOSSLESS_FORMAT}"
         )
     if not groups:
         return cells, blocks
@@ -305,8 +305,8 @@ def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -
     """Read the written file and raise FileError if it differs, because some writers of meshio drop or change cells."""
     with _captured_output("read back", path):
         content = library().read(temporary, file_format=file_format)
-    stored = content.get_cells_type
-    different = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(stored(kind), block)]
+    cells = _meshio_cells(mesh, {})
+    different = [kind for kind, block in cells if not np.array_equal(content.get_cells_type(kind), block)]
     if different or len(content.points) != mesh.n_points:
         listed = f"the {', '.join(different)} cells" if different else "the points"
         raise FileError(f"'{path}': meshio's {file_format} format does not keep {listed}; {OTHER_FORMATS}")

@@ -28,9 +28,9 @@ from fastcontact.arrays import AnyArray
 SECONDS, SECONDS_PER_BYTE = 5.0, 5e-6
 MEMORY, MEMORY_PER_BYTE = 1 << 30, 32
 # Limit of the answer of the child process [bytes]. A compressed file of a few kilobytes can contain many equal points.
-RETURNED, RETURNED_PER_BYTE = 1 << 28, 32
+ANSWER_SIZE, ANSWER_SIZE_PER_BYTE = 1 << 28, 32
 # Ratio of the limits of elapsed time and of computing time, for busy machines.
-WAITING = 10
+ELAPSED_TO_CPU_TIME = 10
 
 # Integer cell data that define groups, in the formats of Gmsh, Medit and others; 0 means no group.
 TAGS = ("gmsh:physical", "medit:ref", "tetgen:ref", "netgen:index", "avsucd:material", "cell_tags")
@@ -55,17 +55,17 @@ def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, 
         return plain_content(path, file_format, field)
     size = path.stat().st_size
     seconds, memory = SECONDS + SECONDS_PER_BYTE * size, MEMORY + MEMORY_PER_BYTE * size
-    limits = f"{seconds:.0f}", str(memory), str(RETURNED + RETURNED_PER_BYTE * size)
+    limits = f"{seconds:.0f}", str(memory), str(ANSWER_SIZE + ANSWER_SIZE_PER_BYTE * size)
     command = [sys.executable, "-P", "-m", __name__, str(path.resolve()), file_format, *limits, field]
     folders = os.pathsep.join(map(os.path.abspath, sys.path))
     try:
         process = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAITING * seconds, check=False,
+            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=ELAPSED_TO_CPU_TIME * seconds, check=False,
             cwd=path.resolve().parent, env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return {"error": f"it was not read within {WAITING * seconds:.0f} s"}
+        return {"error": f"it was not read within {ELAPSED_TO_CPU_TIME * seconds:.0f} s"}
     except OSError as error:
         return {"error": f"no process can be started: {error.strerror}"}
     if process.returncode == -getattr(signal, "SIGXCPU", 0):
@@ -99,7 +99,7 @@ def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, An
     try:
         with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
             content = library().read(path, file_format=file_format)
-            return {**plain_parts(content), **(_fields(content, field) if field else {}), "output": output.getvalue()}
+            return {**plain_mesh(content), **(_fields(content, field) if field else {}), "output": output.getvalue()}
     except MemoryError:
         return {"error": "it announces more data than the memory can hold"}
     except (Exception, SystemExit) as error:
@@ -117,16 +117,16 @@ def _fields(content: Any, field: str) -> dict[str, Any]:
     }
 
 
-def plain_parts(content: Any) -> dict[str, Any]:
+def plain_mesh(content: Any) -> dict[str, Any]:
     """Return the mesh and the groups of a ``meshio.Mesh`` in the format of `plain_content`."""
     cell_data = {key: data for key, data in content.cell_data.items() if key in TAGS or key.startswith(CELL_PREFIX)}
     point_data = {key: data for key, data in content.point_data.items() if key in TAGS or key.startswith(POINT_PREFIX)}
     return {
         "points": _numbers(content.points),
         "cells": [[block.type, len(block.data), _numbers(block.data)] for block in content.cells],
-        "cell_data": {key: [_numbers(values) for values in parts] for key, parts in cell_data.items()},
+        "cell_data": {key: [_numbers(values) for values in arrays] for key, arrays in cell_data.items()},
         "point_data": {key: _numbers(data) for key, data in point_data.items()},
-        "cell_sets": {name: [_numbers(values) for values in parts] for name, parts in content.cell_sets.items()},
+        "cell_sets": {name: [_numbers(values) for values in arrays] for name, arrays in content.cell_sets.items()},
         "point_sets": {name: _numbers(values) for name, values in content.point_sets.items()},
         "field_data": {name: _numbers(entry) for name, entry in content.field_data.items()},
     }
@@ -153,7 +153,7 @@ def _limit(kind: int, value: int) -> None:
 def main() -> None:
     """Read the file named on the command line and write the packed result to the standard output."""
     path, file_format = sys.argv[1:3]
-    seconds, memory, returned = map(int, sys.argv[3:6])
+    seconds, memory, answer_size = map(int, sys.argv[3:6])
     library()
     if sys.platform != "win32":
         import resource
@@ -162,7 +162,7 @@ def main() -> None:
         _limit(resource.RLIMIT_CPU, int(time.process_time()) + 1 + seconds)
         _limit(resource.RLIMIT_AS, memory)
     answer = pack(plain_content(Path(path), file_format, *sys.argv[6:7]))
-    if answer.nbytes > returned:
+    if answer.nbytes > answer_size:
         answer = pack({"error": "it contains more than is plausible for a file of its size"})
     sys.stdout.buffer.write(answer.tobytes())
 

@@ -82,7 +82,7 @@ def segments(quotient: float) -> int:
     return max(1, math.ceil(quotient - 1e-9))
 
 
-def affordable(n_cells: float) -> None:
+def check_size(n_cells: float) -> None:
     """Raise MeshError if a mesh has more than about MOST_CELLS cells."""
     if not n_cells <= MOST_CELLS:
         raise MeshError(
@@ -102,7 +102,7 @@ def one_of(name: str, value: str, known: Sequence[str]) -> str:
     return value
 
 
-def unused(element: str, *alternatives: str, **arguments: Any) -> None:
+def refuse(element: str, *alternatives: str, **arguments: Any) -> None:
     """Raise MeshError if an argument without effect on `element` is not None. The message suggests the `alternatives`."""
     remedy = f"use {', '.join(alternatives)}" if alternatives else "omit it"
     for name, value in arguments.items():

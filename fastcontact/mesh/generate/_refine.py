@@ -13,14 +13,14 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate.forest import RED
-from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on, facets_of
+from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, facets_of, lies_on_curve
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
 # Quadratic elements whose nodes are the corners of the children in `RED`. Each child has the orientation of its parent.
 _LATTICE = {"line2": "line3", "tri3": "tri6", "quad4": "quad9"}
 # Largest angle that a facet of a circle may subtend [radian]. Nodes at larger distances are regarded as those of a polygon.
-_TURN = np.pi / 5
+_LARGEST_ANGLE = np.pi / 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class _Pattern:
     """The division of a cell of one element type, described by the points of its children.
 
     The first n_nodes points are the nodes of the parent, and m new points follow. `children` (n_children, n_nodes) are the
-    points of each child. `shape` (m, n_nodes) [-] contains the shape functions of the parent at the new points. `on_edge`
+    points of each child. `shape` (m, n_nodes) [-] contains the shape functions of the parent at the new points. `edge_number`
     (m,) is the number of the edge of the parent on which a new point lies, -1 inside the parent, and `quarters` (m,) its
     distance from the start of this edge in quarters of the length. `parents` (m, n_nodes) is true for the nodes of this edge,
     and inside the parent for all nodes.
@@ -36,7 +36,7 @@ class _Pattern:
 
     children: AnyArray
     shape: Array
-    on_edge: AnyArray
+    edge_number: AnyArray
     quarters: AnyArray
     parents: Mask
 
@@ -59,15 +59,15 @@ def _pattern(name: str) -> _Pattern:
             child.append(points.index(node))
         children.append(child)
     new_points = np.array(points)[element.n_nodes :]
-    on_edge, quarters = np.full(len(new_points), -1), np.zeros(len(new_points), int)
+    edge_number, quarters = np.full(len(new_points), -1), np.zeros(len(new_points), int)
     parents = np.ones((len(new_points), element.n_nodes), bool)
     for number, (a, b) in enumerate(element.edges):
         start, edge = element.nodes[a], element.nodes[b] - element.nodes[a]
         fraction = (new_points - start) @ edge / (edge @ edge)
-        on = np.abs(new_points - start - fraction[:, None] * edge).max(axis=1) < 1e-12
-        on_edge[on], quarters[on] = number, np.round(4 * fraction[on]).astype(int)
-        parents[on] = np.isin(np.arange(element.n_nodes), [a, b, element.n_corners + number])
-    return _Pattern(np.array(children), element.shape(new_points), on_edge, quarters, parents)
+        is_on_edge = np.abs(new_points - start - fraction[:, None] * edge).max(axis=1) < 1e-12
+        edge_number[is_on_edge], quarters[is_on_edge] = number, np.round(4 * fraction[is_on_edge]).astype(int)
+        parents[is_on_edge] = np.isin(np.arange(element.n_nodes), [a, b, element.n_corners + number])
+    return _Pattern(np.array(children), element.shape(new_points), edge_number, quarters, parents)
 
 
 @typed(MeshError)
@@ -127,9 +127,9 @@ def _lattices(mesh: Mesh) -> tuple[AnyArray, dict[str, AnyArray]]:
     keys, next_key = [], 4 * mesh.n_points**2  # keys of edges are smaller
     for name, block in mesh.cells.items():
         pattern, ends = _pattern(name), block[:, elements.get(name).edges].astype(np.int64)
-        start, end = np.moveaxis(ends[:, pattern.on_edge], 2, 0)
+        start, end = np.moveaxis(ends[:, pattern.edge_number], 2, 0)
         keys.append(_keys(start, end, pattern.quarters, mesh.n_points))
-        inside = np.flatnonzero(pattern.on_edge < 0)
+        inside = np.flatnonzero(pattern.edge_number < 0)
         separate = np.arange(len(inside) * len(block)).reshape(len(inside), len(block))
         keys[-1][:, inside] = next_key + separate.T
         next_key += separate.size
@@ -137,7 +137,7 @@ def _lattices(mesh: Mesh) -> tuple[AnyArray, dict[str, AnyArray]]:
     unique, rank = np.unique(np.concatenate(flat), return_inverse=True)
     numbers = np.split(mesh.n_points + rank, np.cumsum([block.size for block in keys]))
     blocks = zip(mesh.cells.items(), numbers, keys, strict=False)
-    return unique, {name: np.hstack([block, new.reshape(of_cells.shape)]) for (name, block), new, of_cells in blocks}
+    return unique, {name: np.hstack([block, new.reshape(cell_keys.shape)]) for (name, block), new, cell_keys in blocks}
 
 
 def _keys(a: AnyArray, b: AnyArray, quarters: AnyArray | int, n_points: int) -> AnyArray:
@@ -148,7 +148,7 @@ def _keys(a: AnyArray, b: AnyArray, quarters: AnyArray | int, n_points: int) -> 
 
 def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
     """Return the numbers of the new points of the facets in the group of a curve whose nodes all lie on the curve."""
-    facets = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
+    facets = [block[lies_on_curve(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
     if not sum(map(len, facets)):
         kind = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
         raise MeshError(f"no {kind} has all its nodes on {curve}: check its centre and radius")
@@ -168,11 +168,11 @@ def _point_groups(mesh: Mesh, lattices: Mapping[str, AnyArray]) -> dict[str, Any
     """Return the point groups of the refined mesh."""
     groups: dict[str, AnyArray] = {}
     for group, members in mesh.point_groups.items():
-        in_group, parts = np.isin(np.arange(mesh.n_points), members), [members]
+        in_group, blocks = np.isin(np.arange(mesh.n_points), members), [members]
         for name, block in mesh.cells.items() if len(members) > 1 else ():
             inside = (in_group[block][:, None] | ~_pattern(name).parents).all(axis=2)
-            parts.append(lattices[name][:, block.shape[1] :][inside])
-        groups[group] = np.concatenate(parts)
+            blocks.append(lattices[name][:, block.shape[1] :][inside])
+        groups[group] = np.concatenate(blocks)
     return groups
 
 
@@ -189,25 +189,22 @@ def linearised(mesh: Mesh) -> Mesh:
     ['line2', 'quad4']
     """
     cells = {name: block[:, : elements.get(name).n_corners] for name, block in mesh.cells.items()}
-    used = np.ones(mesh.n_points, bool)
+    is_used = np.ones(mesh.n_points, bool)
     for name, block in mesh.cells.items():
-        used[block[:, elements.get(name).n_corners :]] = False
+        is_used[block[:, elements.get(name).n_corners :]] = False
     for block in cells.values():
-        used[block] = True
-    new_point = np.cumsum(used) - 1
-    merged: dict[str, AnyArray] = {}
+        is_used[block] = True
+    new_point = np.cumsum(is_used) - 1
+    linear_cells: dict[str, AnyArray] = {}
     order: list[Indices] = []
     for linear in dict.fromkeys(elements.get(name).linear for name in cells):
         names = [name for name in cells if elements.get(name).linear == linear]
-        merged[linear] = new_point[np.concatenate([cells[name] for name in names])]
+        linear_cells[linear] = new_point[np.concatenate([cells[name] for name in names])]
         order += [mesh.offsets[name] + np.arange(len(cells[name])) for name in names]
     new_cell = np.argsort(np.concatenate(order)) if order else np.empty(0, np.int64)
-    return Mesh(
-        mesh.points[used],
-        merged,
-        {group: new_cell[members] for group, members in mesh.cell_groups.items()},
-        {group: new_point[members[used[members]]] for group, members in mesh.point_groups.items()},
-    )
+    cell_groups = {group: new_cell[members] for group, members in mesh.cell_groups.items()}
+    point_groups = {group: new_point[members[is_used[members]]] for group, members in mesh.point_groups.items()}
+    return Mesh(mesh.points[is_used], linear_cells, cell_groups, point_groups)
 
 
 @typed(MeshError)
@@ -250,6 +247,6 @@ def _circle(mesh: Mesh, group: str, blocks: list[AnyArray]) -> Circle | None:
     radius = np.sqrt(max(c + a * a + b * b, 0.0))
     longest = max(np.linalg.norm(np.diff(mesh.points[block[:, :2]], axis=1), axis=2).max() for block in blocks) / size
     deviation = np.abs(np.hypot(x[:, 0] - a, x[:, 1] - b) - radius).max()
-    if deviation > ON_CURVE * longest or longest > 2 * radius * np.sin(_TURN / 2):
+    if deviation > ON_CURVE * longest or longest > 2 * radius * np.sin(_LARGEST_ANGLE / 2):
         return None
     return Circle((float(centroid[0] + size * a), float(centroid[1] + size * b)), float(radius * size), group)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.mesh.generate._check import affordable, segments
+from fastcontact.mesh.generate._check import check_size, segments
 from fastcontact.mesh.mesh import Mesh
 
 Curve = Callable[[Array], Array]
@@ -54,7 +54,7 @@ def segments_for(length: float, size: float) -> int:
     return segments(length / size)
 
 
-def geometric(length: float, first: float, last: float) -> Array:
+def progression(length: float, first: float, last: float) -> Array:
     """Return relative abscissae (n + 1,) [-] from 0 to 1 of segments in geometric progression.
 
     The n segments of a line of `length` [length] are those of the progression from `first` to `last` [length], multiplied by
@@ -75,7 +75,7 @@ def geometric(length: float, first: float, last: float) -> Array:
     return abscissa / abscissa[-1]
 
 
-def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
+def divide(curve: Curve, length: float, spacing: Spacing) -> Array:
     """Return points (n + 1, 2) [length] that divide a curve of given `length` [length] into segments according to `spacing`.
 
     The function `curve` (n, 2) [length] of parameters (n,) [-] from 0 to 1 must have constant speed.
@@ -92,12 +92,12 @@ def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
     return curve(parameter)
 
 
-def graded(length: float, spacing: Spacing) -> Array:
+def graded_positions(length: float, spacing: Spacing) -> Array:
     """Return positions (n + 1,) [length] from 0 to `length` [length], graded by a spacing with its pole at 0."""
-    return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
+    return divide(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
 
 
-def growing(length: float, first: float, growth: float) -> Array:
+def growing_positions(length: float, first: float, growth: float) -> Array:
     """Return positions (n + 1,) [length] from 0 to `length` [length] with distances in geometric progression.
 
     The first distance is at most `first` [length], and successive distances have the ratio `growth` [-] > 1.
@@ -107,7 +107,7 @@ def growing(length: float, first: float, growth: float) -> Array:
     return np.asarray(length * position / position[-1])
 
 
-def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
+def straight_side(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
     """Return points (n, 2) [length] of a straight side at the abscissae `relative` (n,) [-]. The ends are exact."""
     a, b, s = np.asarray(start, float), np.asarray(end, float), relative[:, None]
     return np.where(s < 1.0, a + s * (b - a), b)
@@ -118,20 +118,20 @@ def arc(centre: Sequence[float], radius: float, angles: Array) -> Array:
     return np.asarray(centre, float) + radius * np.column_stack([np.sin(angles), np.cos(angles)])
 
 
-def rectangular(x: Array, y: Array) -> Array:
+def rectangular_grid(x: Array, y: Array) -> Array:
     """Return the grid (n + 1, m + 1, 2) [length] of the coordinates `x` (n + 1,) [length] and `y` (m + 1,) [length]."""
-    affordable(len(x) * len(y))
+    check_size(len(x) * len(y))
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
 
 
-def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, v: Array) -> Array:
+def coons_patch(bottom: Array, right: Array, top: Array, left: Array, u: Array, v: Array) -> Array:
     """Return the grid (n + 1, m + 1, 2) [length] between four sides, whose nodes it contains.
 
     It is the bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6). The
     nodes of `bottom` (n + 1, 2) [length] and `top` (n + 1, 2) [length] have the relative abscissae `u` (n + 1,) [-], from 0
     to 1, and those of `right` (m + 1, 2) [length] and `left` (m + 1, 2) [length] have `v` (m + 1,) [-].
     """
-    affordable(len(u) * len(v))
+    check_size(len(u) * len(v))
     U, V = u[:, None, None], v[None, :, None]
     between_rows = (1 - V) * bottom[:, None] + V * top[:, None]
     between_columns = (1 - U) * left[None] + U * right[None]
@@ -141,7 +141,7 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
     return grid
 
 
-def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
+def grid_mesh(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
     """Return the linear mesh of a grid, with all cells in the group `solid`.
 
     The first index of the `grid` (n + 1, m + 1, 2) [length] increases to the right, the second one upward. `sides` maps

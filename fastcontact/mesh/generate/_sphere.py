@@ -12,8 +12,8 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import count, each, one_of, positive
-from fastcontact.mesh.generate._spacing import Spacing, graded, segments_for
-from fastcontact.mesh.generate.box import on_lines
+from fastcontact.mesh.generate._spacing import Spacing, graded_positions, segments_for
+from fastcontact.mesh.generate.box import mesh_on_lines
 from fastcontact.mesh.generate.transform import merge_points, renamed, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -83,7 +83,7 @@ def sphere_on_block(
     width, height = each(positive, "block_size", (R, R) if block_size is None else block_size)
     sizes: Any = {"size": size, "contact_size": contact_size, "contact_radius": contact_radius, "growth": growth}
     sphere, spacing = sphere_octant(element, R=R, **sizes), _spacing(R, **sizes)
-    horizontal, vertical = graded(width, spacing), graded(height, _depth_spacing(spacing))
+    horizontal, vertical = graded_positions(width, spacing), graded_positions(height, _depth_spacing(spacing))
     names = {"BLOCK": "BLOCK", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "CONT_BLOCK", "ZMAX": "BLOCK_BOTTOM"}
     names |= {"XMAX": "BLOCK_SIDE", "YMAX": "BLOCK_SIDE"}
     grid = horizontal, horizontal, vertical
@@ -124,8 +124,8 @@ def sphere_octant(
     R = positive("R", R)
     spacing = _spacing(R, size, contact_size, contact_radius, growth)
     eighth = math.pi / 4
-    angles = graded(R * eighth, spacing) / R
-    outward = 1.0 - graded((1.0 - INNER) * R, _depth_spacing(spacing))[::-1] / ((1.0 - INNER) * R)
+    angles = graded_positions(R * eighth, spacing) / R
+    outward = 1.0 - graded_positions((1.0 - INNER) * R, _depth_spacing(spacing))[::-1] / ((1.0 - INNER) * R)
     upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
 
     def map_of_block(face: int) -> Map:
@@ -185,7 +185,7 @@ def _depth_spacing(spacing: Spacing) -> Spacing:
 
 def _mapped_box(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
     """Return a box with the given grid lines, mapped by `place`. It has the groups that are keys of `names`, renamed."""
-    lattice = on_lines(element, grid, solid)
+    lattice = mesh_on_lines(element, grid, solid)
     sides = {side: lattice.cells_of(side) for side in lattice.cell_groups if side in names and side != solid}
     body = Mesh(place(*lattice.points.T), lattice.solids, {solid: lattice.cell_groups[solid]})
     mesh = body.with_facets(sides)

@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.errors import MeshError
-from fastcontact.mesh.generate._check import affordable
+from fastcontact.mesh.generate._check import check_size
 from fastcontact.mesh.generate._spacing import Spacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import corner_angles
@@ -26,7 +26,7 @@ _ROW_HEIGHT = np.sqrt(3.0) / 2  # height of an equilateral triangle
 _CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 
 
-def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
+def triangulated_body(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, with all cells in the group `solid`.
 
     Each of the `sides` (n, 2) [length] consists of a name and nodes. They are in counter-clockwise order, and each begins at
@@ -77,8 +77,8 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
         points = np.vstack([points, midpoints])
         movable = np.arange(len(points)) >= n_fixed
         # Only points near the new ones are relaxed, because the positions of the others are already good.
-        near = nearest(midpoints, points)[0] < _MOVING_RADIUS * spacing(points)
-        points = relax(points, movable & near, spacing, 16)
+        is_near = nearest(midpoints, points)[0] < _MOVING_RADIUS * spacing(points)
+        points = relax(points, movable & is_near, spacing, 16)
     return None
 
 
@@ -89,15 +89,15 @@ def _midpoints_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> A
     """
     edges = edges_of(delaunay(points))
     # Sides of the outline are excluded, but not chords that cut off a corner.
-    side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
-    edges = edges[~side]
+    is_side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
+    edges = edges[~is_side]
     midpoints = points[edges].mean(axis=1)
     sides = points[edges[:, 0]] - points[edges[:, 1]]
     ratio = np.hypot(sides[:, 0], sides[:, 1]) / spacing(midpoints)
-    long = ratio > 1.0 + 1e-9
+    is_long = ratio > 1.0 + 1e-9
     worst = np.zeros(len(points))
-    np.maximum.at(worst, edges[long].ravel(), np.repeat(ratio[long], 2))
-    return midpoints[long & (ratio >= worst[edges].max(axis=1))]
+    np.maximum.at(worst, edges[is_long].ravel(), np.repeat(ratio[is_long], 2))
+    return midpoints[is_long & (ratio >= worst[edges].max(axis=1))]
 
 
 def _check_count(triangles: Indices, n_points: int, n_outline: int) -> Indices:
@@ -127,7 +127,7 @@ def _accepted_seeds(seeds: Array, outline: Array, spacing: Spacing, density: flo
     """Return the seeds (m, 2) without those too close to the outline or to earlier seeds, as in narrow bodies."""
     accepted: list[Array] = []
     for seed, depth, size in zip(seeds, _depths(outline, seeds), density * spacing(seeds), strict=True):
-        if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in accepted):
+        if depth > 0.4 * size and all(np.hypot(*(seed - earlier)) > 0.7 * size for earlier in accepted):
             accepted.append(seed)
     return np.array(accepted).reshape(-1, 2)
 
@@ -161,7 +161,7 @@ def _lattice(spacing: Spacing, density: float, low: Array, high: Array) -> Array
     size = density * spacing.far
     rows = np.arange(np.floor(low[1] / (_ROW_HEIGHT * size)), np.ceil(high[1] / (_ROW_HEIGHT * size)) + 1)
     columns = np.arange(np.floor(low[0] / size) - 1, np.ceil(high[0] / size) + 1)
-    affordable(2.0 * len(rows) * len(columns))
+    check_size(2.0 * len(rows) * len(columns))
     row, column = np.meshgrid(rows, columns, indexing="ij")
     return np.column_stack([(size * (column + 0.5 * (row % 2))).ravel(), (_ROW_HEIGHT * size * row).ravel()])
 
@@ -179,7 +179,7 @@ def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
         radius += _ROW_HEIGHT * size
         n = max(6, round(2 * np.pi * radius / size))
         total += n
-        affordable(2.0 * total)
+        check_size(2.0 * total)
         angle = 2 * np.pi * (np.arange(n) + shift) / n - 0.5 * np.pi
         rings.append(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
         shift = 0.5 - shift
@@ -194,8 +194,9 @@ _STRETCH = 1.2  # rest length of the bars relative to their scaled length; it ex
 _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 13)[:-1]
 _TRIALS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TRIALS = np.vstack([_TRIALS, 0.5 * _TRIALS])
-_GOOD = np.sin(np.radians(50.0))  # points around which all angles are larger are not moved
-_TOO_LONG = 0.5, 2.0  # penalty of an edge that is too long, constant and per relative excess, as the sine of an angle
+_GOOD_SINE = np.sin(np.radians(50.0))  # points around which all angles are larger are not moved
+# Penalty of an edge that is too long: a constant, and a term per relative excess of the length, as sines of angles.
+_LENGTH_PENALTY = 0.5, 2.0
 
 
 def delaunay(points: Array) -> Indices:
@@ -259,8 +260,8 @@ def _bar_forces(points: Array, edges: Indices, desired: Array) -> Array:
     bars = points[edges[:, 0]] - points[edges[:, 1]]
     length = np.sqrt((bars * bars).sum(axis=1))
     # The rest lengths are scaled to the actual lengths, so that the pressure is the same everywhere.
-    rest = _STRETCH * desired * np.sqrt((length**2).sum() / (desired**2).sum())
-    force = (np.maximum(rest - length, 0.0) / length)[:, None] * bars
+    rest_length = _STRETCH * desired * np.sqrt((length**2).sum() / (desired**2).sum())
+    force = (np.maximum(rest_length - length, 0.0) / length)[:, None] * bars
     total = np.empty_like(points)
     for axis in range(2):
         total[:, axis] = np.bincount(edges[:, 0], force[:, axis], len(points))
@@ -293,7 +294,7 @@ def _sweep(points: Array, movable: Mask, edges: Indices, stars: Indices, limit: 
     """Try to move every point with a small angle, the worst first, in place, and return whether any point has moved."""
     quality = np.full(len(points), np.inf)
     quality[movable] = _star_quality(points[movable, None], points, stars[movable], limit[movable])[:, 0]
-    quality[quality >= _GOOD] = np.inf
+    quality[quality >= _GOOD_SINE] = np.inf
     moved = False
     for _ in range(6):
         neighbours = np.full(len(points), np.inf)
@@ -327,5 +328,5 @@ def _star_quality(positions: Array, points: Array, stars: Indices, limit: Array)
     shortest = np.minimum(np.minimum(uu, vv), ww)
     sine = twice_area * np.sqrt(shortest / np.maximum(uu * vv * ww, 1e-300))
     excess = np.sqrt(np.maximum(uu, vv)) / limit[:, None, None] - 1.0
-    quality = sine - np.where(excess > 0.0, _TOO_LONG[0] + _TOO_LONG[1] * excess, 0.0)
+    quality = sine - np.where(excess > 0.0, _LENGTH_PENALTY[0] + _LENGTH_PENALTY[1] * excess, 0.0)
     return np.where(stars[:, None, :, 0] >= 0, quality, np.inf).min(axis=-1)

@@ -13,14 +13,14 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, number, one_of, positive, within
 from fastcontact.mesh.generate._spacing import (
     Spacing,
-    divided,
-    geometric,
-    rectangular,
+    divide,
+    grid_mesh,
+    progression,
+    rectangular_grid,
     segments_for,
-    straight,
-    structured,
+    straight_side,
 )
-from fastcontact.mesh.generate._triangulate import filled
+from fastcontact.mesh.generate._triangulate import triangulated_body
 from fastcontact.mesh.generate.half_spheres import quarter_disc
 from fastcontact.mesh.generate.quadratic import converted_to
 from fastcontact.mesh.generate.transform import renamed, union, with_points_at
@@ -72,16 +72,16 @@ def block(
     width, height = each(positive, "size", size)
     n, m = each(count, "divisions", divisions)
     left, bottom = each(number, "origin", origin)
-    amount = within("distortion", distortion, 0.0, 0.24)
-    grid = rectangular(left + width * np.linspace(0, 1, n + 1), bottom + height * np.linspace(0, 1, m + 1))
-    grid += _distortion_pattern(n, m) * amount * np.array([width / n, height / m])
+    amplitude = within("distortion", distortion, 0.0, 0.24)
+    grid = rectangular_grid(left + width * np.linspace(0, 1, n + 1), bottom + height * np.linspace(0, 1, m + 1))
+    grid += _distortion_pattern(n, m) * amplitude * np.array([width / n, height / m])
     return _block_mesh(grid, element, name)
 
 
 def _block_mesh(grid: Array, element: str, name: str) -> Mesh:
     """Return the mesh of a grid with cells of type `element` and with groups for its sides and corners."""
     sides = {side: side for side in ("BOTTOM", "RIGHT", "TOP", "LEFT")}
-    mesh = converted_to(structured(grid, name, sides, triangles=element in TRIANGLES), element)
+    mesh = converted_to(grid_mesh(grid, name, sides, triangles=element in TRIANGLES), element)
     corners = {"BOTTOM_LEFT": grid[0, 0], "BOTTOM_RIGHT": grid[-1, 0]}
     return with_points_at(mesh, {**corners, "TOP_RIGHT": grid[-1, -1], "TOP_LEFT": grid[0, -1]})
 
@@ -224,9 +224,9 @@ _BLOCK_NAMES = {
 
 def _graded_block(element: str, width: float, height: float, near: float, far: float) -> Mesh:
     """Return a block of quadrangles whose edges along the axes form geometric progressions from the pole."""
-    x = width * geometric(width, near, far)
-    y = -height * geometric(height, near, far)[::-1]
-    return renamed(_block_mesh(rectangular(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
+    x = width * progression(width, near, far)
+    y = -height * progression(height, near, far)[::-1]
+    return renamed(_block_mesh(rectangular_grid(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
 
 
 def _free_block(element: str, width: float, height: float, spacing: Spacing) -> Mesh:
@@ -234,8 +234,8 @@ def _free_block(element: str, width: float, height: float, spacing: Spacing) -> 
     corners = [(0.0, 0.0), (0.0, -height), (width, -height), (width, 0.0)]
     names = ["LEFT", "BOTTOM", "RIGHT", "TOP"]
     sides = [
-        (name, divided(partial(straight, start, end), math.dist(start, end), spacing))
+        (name, divide(partial(straight_side, start, end), math.dist(start, end), spacing))
         for name, start, end in zip(names, corners, corners[1:] + corners[:1], strict=True)
     ]
-    mesh = converted_to(filled("BLOCK", sides, spacing), element)
+    mesh = converted_to(triangulated_body("BLOCK", sides, spacing), element)
     return renamed(with_points_at(mesh, {"TOP_LEFT": (0.0, 0.0)}), _BLOCK_NAMES.get)

@@ -11,7 +11,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
-from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
+from fastcontact.mesh.generate._check import check_size, count, each, number, one_of, positive
 from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
@@ -83,7 +83,7 @@ def box(
 
 def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     """Return the cells (n_cells, n_nodes), and the positions (n_points, 3) of their nodes in steps of the lattice."""
-    affordable(float(np.prod(shape, dtype=float)) * len(_DIVISIONS[solid.linear]))
+    check_size(float(np.prod(shape, dtype=float)) * len(_DIVISIONS[solid.linear]))
     corners = np.vstack([_CORNERS, _CORNERS.mean(axis=0, keepdims=True).astype(np.int64)])
     local = solid.corner_shape(solid.nodes) @ corners[_DIVISIONS[solid.linear]]
     # Positions in the lattice are numbered, so that coincident nodes have equal numbers.
@@ -96,7 +96,7 @@ def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     return block.reshape(-1, solid.n_nodes), lattice
 
 
-def on_lines(element: str, lines: Sequence[Array], name: str = "BLOCK") -> Mesh:
+def mesh_on_lines(element: str, lines: Sequence[Array], name: str = "BLOCK") -> Mesh:
     """Return a mesh with the given grid lines, and with the groups of `block` in 2D and of `box` in 3D.
 
     Parameters

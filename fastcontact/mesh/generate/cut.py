@@ -64,8 +64,8 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     cells = {}
     for name, start in mesh.offsets.items():
         block = mesh.cells[name]
-        new = beyond_cut[start : start + len(block), None] & (new_node[block] >= 0)
-        cells[name] = np.where(new, new_node[block], block)
+        is_new = beyond_cut[start : start + len(block), None] & (new_node[block] >= 0)
+        cells[name] = np.where(is_new, new_node[block], block)
     point_groups = {
         name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
         for name, members in mesh.point_groups.items()
@@ -101,12 +101,12 @@ def _sides_at(mesh: Mesh, marked: Mask) -> _Sides:
     """Return the facets with a marked point, and all sides of the solid cells with a marked point."""
     nodes, cell, is_facet = [], [], []
     for name, block in {**mesh.solids, **mesh.facets}.items():
-        element, near = elements.get(name), np.flatnonzero(marked[block].any(axis=1))
+        element, rows = elements.get(name), np.flatnonzero(marked[block].any(axis=1))
         for side in element.facets if element.dim == mesh.dim else [range(element.n_nodes)]:
-            sets = np.sort(block[near][:, list(side)], axis=1)
+            sets = np.sort(block[rows][:, list(side)], axis=1)
             nodes.append(np.pad(sets, ((0, 0), (0, MOST_NODES - len(side))), constant_values=-1))
-            cell.append(mesh.offsets[name] + near)
-            is_facet.append(np.full(len(near), element.dim < mesh.dim))
+            cell.append(mesh.offsets[name] + rows)
+            is_facet.append(np.full(len(rows), element.dim < mesh.dim))
     distinct, row = np.unique(np.concatenate(nodes), axis=0, return_inverse=True)
     return _Sides(np.concatenate(cell), np.concatenate(is_facet), row.ravel(), distinct.astype(np.intp))
 
@@ -152,9 +152,9 @@ def _heights(mesh: Mesh, marked: Mask, direction: Array) -> Array:
     """
     heights = np.zeros((2, mesh.n_cells))
     for name, block in mesh.solids.items():
-        positions, near = mesh.points[block] @ direction, marked[block]
+        positions, is_marked = mesh.points[block] @ direction, marked[block]
         cells = slice(mesh.offsets[name], mesh.offsets[name] + len(block))
         heights[0, cells] = positions.mean(axis=1)
-        marked_mean = (positions * near).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
-        heights[1, cells] = np.where(near.any(axis=1), heights[0, cells] - marked_mean, 0.0)
+        marked_mean = (positions * is_marked).sum(axis=1) / np.maximum(is_marked.sum(axis=1), 1)
+        heights[1, cells] = np.where(is_marked.any(axis=1), heights[0, cells] - marked_mean, 0.0)
     return heights

@@ -85,7 +85,7 @@ class Forest:
             for name, block in mesh.cells.items()
         }
         # The sorted keys of divided edges, and the numbers of their midpoints.
-        self._divided, self._middle = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._divided, self._midpoint_numbers = np.empty(0, np.int64), np.empty(0, np.int64)
         self._groups = {group: np.asarray(members) for group, members in mesh.point_groups.items()}
         self._on_curve = [edges_on(mesh, curve) for curve in self.curves]
 
@@ -121,18 +121,18 @@ class Forest:
         if not len(self._divided):
             return np.full(keys.shape, -1)
         index = np.minimum(np.searchsorted(self._divided, keys), len(self._divided) - 1)
-        return np.where(self._divided[index] == keys, self._middle[index], -1)
+        return np.where(self._divided[index] == keys, self._midpoint_numbers[index], -1)
 
     def _add_midpoints(self, keys: AnyArray) -> None:
         """Add the midpoints of edges that are not divided yet."""
-        new = np.setdiff1d(keys, self._divided)
-        if not len(new):
+        new_keys = np.setdiff1d(keys, self._divided)
+        if not len(new_keys):
             return
-        ends = ends_of(new)
-        numbers = len(self.points) + np.arange(len(new))
+        ends = ends_of(new_keys)
+        numbers = len(self.points) + np.arange(len(new_keys))
         positions = self.points[ends].mean(axis=1)
         for k, curve in enumerate(self.curves):
-            rows = np.isin(new, self._on_curve[k])
+            rows = np.isin(new_keys, self._on_curve[k])
             positions[rows] = curve.project(positions[rows])
             halves = edge_keys(np.stack([ends[rows], np.repeat(numbers[rows, None], 2, axis=1)], axis=2)).ravel()
             self._on_curve[k] = np.concatenate([self._on_curve[k], halves])
@@ -140,9 +140,9 @@ class Forest:
         for group, members in self._groups.items():
             if len(members) > 1:
                 self._groups[group] = np.concatenate([members, numbers[np.isin(ends, members).all(axis=1)]])
-        order = np.argsort(np.concatenate([self._divided, new]))
-        self._divided = np.concatenate([self._divided, new])[order]
-        self._middle = np.concatenate([self._middle, numbers])[order]
+        order = np.argsort(np.concatenate([self._divided, new_keys]))
+        self._divided = np.concatenate([self._divided, new_keys])[order]
+        self._midpoint_numbers = np.concatenate([self._midpoint_numbers, numbers])[order]
 
     def _refine_leaves(self, name: str, mask: Mask) -> None:
         """Divide the marked leaves of one element type: quadrangles and triangles into four, lines into two."""
@@ -173,8 +173,8 @@ class Forest:
         ends = corners[:, elements.get(name).edges]
         twice = np.zeros(divided.shape, bool)
         for end in (0, 1):
-            half = edge_keys(np.stack([ends[:, :, end], np.where(divided, midpoints, 0)], axis=2))
-            twice |= divided & (self._midpoints(half) >= 0)
+            half_keys = edge_keys(np.stack([ends[:, :, end], np.where(divided, midpoints, 0)], axis=2))
+            twice |= divided & (self._midpoints(half_keys) >= 0)
         count = divided.sum(axis=1)
         opposite = (count == 2) & (divided[:, 0] == divided[:, 2]) if name == "quad4" else np.zeros(len(corners), bool)
         return np.asarray(twice.any(axis=1) | ((count > 1) & ~opposite))
@@ -193,13 +193,13 @@ class Forest:
         Cell groups contain the descendants of their cells. A new point belongs to the point groups that contain both ends of
         its edge.
         """
-        parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {}  # cells with their roots and leaves
+        blocks: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {}  # cells with their roots and leaves
         first = 0
         for name, leaves in self._leaves.items():
             for kind, cells, leaf in self._green_cells(name, leaves.corners):
-                parts.setdefault(kind, []).append((cells, leaves.root[leaf], first + leaf))
+                blocks.setdefault(kind, []).append((cells, leaves.root[leaf], first + leaf))
             first += len(leaves.corners) if name != "line2" else 0
-        joined = {kind: [np.concatenate(arrays) for arrays in zip(*parts[kind], strict=True)] for kind in parts}
+        joined = {kind: [np.concatenate(arrays) for arrays in zip(*blocks[kind], strict=True)] for kind in blocks}
         root = np.concatenate([roots for _, roots, _ in joined.values()])
         groups = {group: np.flatnonzero(np.isin(root, members)) for group, members in self.initial.cell_groups.items()}
         mesh = Mesh(self.points, {kind: cells for kind, (cells, _, _) in joined.items()}, groups, self._groups)

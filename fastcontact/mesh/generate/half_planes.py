@@ -8,9 +8,9 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.generate._check import FACES, QUADRANGLES, growth_of, one_of, positive, segments, unused
-from fastcontact.mesh.generate._spacing import Spacing, graded, growing
-from fastcontact.mesh.generate.box import SOLIDS, on_lines
+from fastcontact.mesh.generate._check import FACES, QUADRANGLES, growth_of, one_of, positive, refuse, segments
+from fastcontact.mesh.generate._spacing import Spacing, graded_positions, growing_positions
+from fastcontact.mesh.generate.box import SOLIDS, mesh_on_lines
 from fastcontact.mesh.generate.transform import mirrored, renamed, union, with_cells_inside, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
@@ -78,17 +78,17 @@ def graded_block(
     radii = [radius] * (dim - 1)
     if contact_radius_y is not None:
         if dim == 2:
-            unused(element, contact_radius_y=contact_radius_y)
+            refuse(element, contact_radius_y=contact_radius_y)
         radii[1] = positive("contact_radius_y", contact_radius_y, width, "width")
     far = width / 4 if size is None else positive("size", size, width, "width")
     near = min(min(radii) / 10, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
     reach = max(far - near, near) / positive("growth", growth, 1.0)
 
     def coordinates(length: float, plateau: float) -> Array:
-        return graded(length, Spacing(near, far, plateau=plateau, reach=plateau + reach))
+        return graded_positions(length, Spacing(near, far, plateau=plateau, reach=plateau + reach))
 
     lines = [*(coordinates(width, radius) for radius in radii), -coordinates(depth, min(*radii, 2 * depth) / 2)[::-1]]
-    return _with_groups(on_lines(element, lines), lines, radii)
+    return _with_groups(mesh_on_lines(element, lines), lines, radii)
 
 
 def _with_groups(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
@@ -147,10 +147,10 @@ def punched_block(
     if width < 2 * radius:
         raise MeshError(f"extent = {width:g} is out of range: it must be at least 2 punch_radius = {2 * radius:g}")
     size = radius / 200 if edge_size is None else positive("edge_size", edge_size, radius, "punch_radius")
-    inward, outward = growing(radius, size, rate), growing(width - radius, size, rate)
+    inward, outward = growing_positions(radius, size, rate), growing_positions(width - radius, size, rate)
     x = np.concatenate([radius - inward[::-1], radius + outward[1:]])
     x[0], x[-1] = 0.0, width
-    mesh = on_lines(element, [x, -growing(width, size, rate)[::-1]])
+    mesh = mesh_on_lines(element, [x, -growing_positions(width, size, rate)[::-1]])
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | _NAMES_2D)
     mesh = with_cells_inside(mesh, "PUNCHED", "TOP", lambda points: points[:, 0] <= radius)
     return with_points_at(mesh, {"POLE": (0.0, 0.0), "EDGE": (radius, 0.0)})
@@ -207,7 +207,7 @@ def crowned_blocks(
     fine = positive("contact_radius", contact_radius, width / 2, "extent/2")
     size = positive("contact_size", contact_size, fine, "contact_radius")
     right, down = _positions(size, fine, width, rate), _positions(size, size, width, rate)
-    lattice = on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
+    lattice = mesh_on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
     x, y = lattice.points.T
     crown = x**2 / (2 * R) * (1 + y / width)  # the displacement of the nodes decays downward
     lower = renamed(lattice.replace(points=np.column_stack([x, y - crown])), _NAMES_CROWNED.get)
@@ -220,4 +220,4 @@ def crowned_blocks(
 def _positions(size: float, fine: float, length: float, growth: float) -> Array:
     """Return positions (n + 1,) from 0 to `length`, at distances of about `size` up to `fine` that grow beyond [length]."""
     equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
-    return np.concatenate([equal, fine + growing(length - fine, size * growth, growth)[1:]])
+    return np.concatenate([equal, fine + growing_positions(length - fine, size * growth, growth)[1:]])

@@ -10,16 +10,16 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
-from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count, each, one_of, positive, unused, within
-from fastcontact.mesh.generate._spacing import Spacing, arc, divided, geometric, straight, structured, transfinite
-from fastcontact.mesh.generate._triangulate import filled
+from fastcontact.mesh.generate._check import FACES, TRIANGLES, check_size, count, each, one_of, positive, refuse, within
+from fastcontact.mesh.generate._spacing import Spacing, arc, coons_patch, divide, grid_mesh, progression, straight_side
+from fastcontact.mesh.generate._triangulate import triangulated_body
 from fastcontact.mesh.generate.quadratic import Circle, converted_to
 from fastcontact.mesh.generate.transform import merge_points, mirrored, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
 # Group names of the upper body, by the corresponding names of the lower body. A1A2 is the axis of both bodies.
-_UPPER = {"SPHBAS": "SPHHAU", "A1B1": "A2B2", "CONT1": "CONT2", "D1B1": "D2B2"}
-_UPPER |= {f"{letter}1": f"{letter}2" for letter in "ABCD"} | {f"{letter}1": letter for letter in "MNP"}
+_UPPER_NAMES = {"SPHBAS": "SPHHAU", "A1B1": "A2B2", "CONT1": "CONT2", "D1B1": "D2B2"}
+_UPPER_NAMES |= {f"{letter}1": f"{letter}2" for letter in "ABCD"} | {f"{letter}1": letter for letter in "MNP"}
 
 
 @typed(MeshError)
@@ -90,7 +90,7 @@ def half_spheres(
         element, R=R, size=size, contact_size=contact_size, contact_radius=contact_radius, arc_sizes=arc_sizes,
         segments=segments, radial_sizes=radial_sizes,
     )  # fmt: skip
-    return union(lower, mirrored(lower, "y", rename=_UPPER))
+    return union(lower, mirrored(lower, "y", rename=_UPPER_NAMES))
 
 
 @typed(MeshError)
@@ -135,14 +135,14 @@ def quarter_disc(
     one_of("body", body, ("lower", "upper"))
     R = positive("R", R)
     if element in TRIANGLES:
-        unused(element, "size", "contact_size", arc_sizes=arc_sizes, segments=segments, radial_sizes=radial_sizes)
+        refuse(element, "size", "contact_size", arc_sizes=arc_sizes, segments=segments, radial_sizes=radial_sizes)
         linear = _triangle_mesh(R, _spacing(R, size, contact_size, contact_radius))
     else:
         sizes = {"size": size, "contact_size": contact_size, "contact_radius": contact_radius}
-        unused(element, "arc_sizes", "radial_sizes", "segments", **sizes)
+        refuse(element, "arc_sizes", "radial_sizes", "segments", **sizes)
         linear = _quadrangle_mesh(R, arc_sizes, segments, radial_sizes)
     disc = converted_to(linear, element, [Circle((0.0, -R), R, group) for group in ("CONT1", "D1B1")])
-    return disc if body == "lower" else mirrored(disc, "y", rename=_UPPER)
+    return disc if body == "lower" else mirrored(disc, "y", rename=_UPPER_NAMES)
 
 
 def _corners(R: float) -> dict[str, tuple[float, float]]:
@@ -155,7 +155,7 @@ def _spacing(R: float, size: float | None, contact_size: float | None, contact_r
     """Return the spacing of triangles, after a check of the arguments of `half_spheres`."""
     far = R / 25 if size is None else positive("size", size, R, "R")
     if contact_size is None:
-        unused("uniform", contact_radius=contact_radius)
+        refuse("uniform", contact_radius=contact_radius)
         return Spacing(far, far, reach=R)
     near = positive("contact_size", contact_size, far, "size")
     plateau = 0.0 if contact_radius is None else within("contact_radius", contact_radius, 0.0, R / 2)
@@ -166,12 +166,12 @@ def _triangle_mesh(R: float, spacing: Spacing) -> Mesh:
     """Return the lower body meshed with tri3 cells."""
     corners, angle_B, angle_D = _corners(R), 0.5 * math.pi, 0.25 * math.pi
     sides = [
-        ("A1B1", divided(lambda s: straight(corners["A1"], corners["B1"], s), R, spacing)),
-        ("D1B1", divided(lambda s: arc((0.0, -R), R, angle_B - s * angle_D), R * angle_D, spacing)),
-        ("CONT1", divided(lambda s: arc((0.0, -R), R, angle_D - s * angle_D), R * angle_D, spacing)),
-        ("A1A2", divided(lambda s: straight(corners["C1"], corners["A1"], s), R, spacing)),
+        ("A1B1", divide(lambda s: straight_side(corners["A1"], corners["B1"], s), R, spacing)),
+        ("D1B1", divide(lambda s: arc((0.0, -R), R, angle_B - s * angle_D), R * angle_D, spacing)),
+        ("CONT1", divide(lambda s: arc((0.0, -R), R, angle_D - s * angle_D), R * angle_D, spacing)),
+        ("A1A2", divide(lambda s: straight_side(corners["C1"], corners["A1"], s), R, spacing)),
     ]
-    return with_points_at(filled("SPHBAS", sides, spacing), corners)
+    return with_points_at(triangulated_body("SPHBAS", sides, spacing), corners)
 
 
 def _quadrangle_mesh(
@@ -182,14 +182,14 @@ def _quadrangle_mesh(
     length = 0.25 * math.pi * R
     sizes = (R / 250, R / 25) if arc_sizes is None else arc_sizes
     near, far = each(partial(positive, at_most=length), "arc_sizes", sizes)
-    on_arc = geometric(length, near, far)
+    on_arc = progression(length, near, far)
     equal = np.linspace(0.0, 1.0, n + 1)
     if radial_sizes is None:
         lengths = (near / far) ** (np.arange(n) / max(n - 1, 1))
         outward = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
     else:
         at_arc, at_square = each(partial(positive, at_most=0.5 * R), "radial_sizes", radial_sizes)
-        outward = geometric(0.5 * R, at_square, at_arc)
+        outward = progression(0.5 * R, at_square, at_arc)
     return _three_blocks(R, on_arc, outward, equal)
 
 
@@ -198,7 +198,7 @@ def _three_blocks(R: float, on_arc: Array, outward: Array, equal: Array) -> Mesh
     corners = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
 
     def line(start: str, end: str, relative: Array) -> Array:
-        return straight(corners[start], corners[end], relative)
+        return straight_side(corners[start], corners[end], relative)
 
     angle_D = 0.25 * math.pi
     contact_arc = arc((0.0, -R), R, angle_D * on_arc)
@@ -206,13 +206,13 @@ def _three_blocks(R: float, on_arc: Array, outward: Array, equal: Array) -> Mesh
     bottom, top = line("A1", "P1", on_arc), line("M1", "N1", on_arc)  # sides of the square
     right, radial = line("P1", "N1", equal), line("N1", "D1", outward)
     radial[-1] = contact_arc[-1] = outer_arc[-1]  # D1 is common to three sides, which must agree bitwise
-    square = transfinite(bottom, right, top, line("A1", "M1", equal), on_arc, equal)
-    upper = transfinite(top, radial, contact_arc, line("M1", "C1", outward), on_arc, outward)
-    outer = transfinite(line("P1", "B1", outward), outer_arc, radial, right, outward, equal)
+    square = coons_patch(bottom, right, top, line("A1", "M1", equal), on_arc, equal)
+    upper = coons_patch(top, radial, contact_arc, line("M1", "C1", outward), on_arc, outward)
+    outer = coons_patch(line("P1", "B1", outward), outer_arc, radial, right, outward, equal)
     blocks = [
-        structured(square, "SPHBAS", {"BOTTOM": "A1B1", "LEFT": "A1A2"}),
-        structured(upper, "SPHBAS", {"TOP": "CONT1", "LEFT": "A1A2"}),
-        structured(outer, "SPHBAS", {"BOTTOM": "A1B1", "RIGHT": "D1B1"}),
+        grid_mesh(square, "SPHBAS", {"BOTTOM": "A1B1", "LEFT": "A1A2"}),
+        grid_mesh(upper, "SPHBAS", {"TOP": "CONT1", "LEFT": "A1A2"}),
+        grid_mesh(outer, "SPHBAS", {"BOTTOM": "A1B1", "RIGHT": "D1B1"}),
     ]
     return with_points_at(merge_points(union(*blocks), 1e-9 * R), corners)
 
@@ -273,9 +273,9 @@ def _ring(element: str, radii: tuple[float, float], divisions: list[int], name: 
     r, angle = np.linspace(*radii, n + 1), np.linspace(0.0, math.pi / 2, m + 1)
     cosine, sine = np.cos(angle), np.sin(angle)
     cosine[-1] = 0.0
-    affordable(n * m)
+    check_size(n * m)
     grid = r[:, None, None] * np.column_stack([cosine, sine])[None]
     groups = {"LEFT": sides[0], "RIGHT": sides[1], "BOTTOM": "SYMMETRY_Y", "TOP": "SYMMETRY_X"}
-    mesh = structured(grid, name, groups, triangles=element in TRIANGLES)
+    mesh = grid_mesh(grid, name, groups, triangles=element in TRIANGLES)
     circles = [Circle((0.0, 0.0), radius, group) for radius, group in zip(radii, sides, strict=True)]
     return converted_to(mesh, element, circles)

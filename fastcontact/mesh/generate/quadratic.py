@@ -181,7 +181,7 @@ def edges_on(mesh: Mesh, curve: Curve) -> AnyArray:
     Raises MeshError if there is no such edge.
     """
     edges = _edges(facets_of(mesh, curve))
-    on_curve = all_on(mesh, curve, ends_of(edges))
+    on_curve = lies_on_curve(mesh, curve, ends_of(edges))
     if not on_curve.any():
         facets = "outer facets" if curve.group is None else f"group '{curve.group}'"
         raise MeshError(f"no edge of {facets} has both ends on {curve}: check its centre and radius")
@@ -193,7 +193,7 @@ def facets_of(mesh: Mesh, curve: Curve) -> Mapping[str, AnyArray]:
     return outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=mesh.dim - 1)
 
 
-def all_on(mesh: Mesh, curve: Curve, nodes: AnyArray) -> Mask:
+def lies_on_curve(mesh: Mesh, curve: Curve, nodes: AnyArray) -> Mask:
     """Return for each facet or edge (n,) whether all its nodes lie on a curve.
 
     `nodes` (n, n_nodes) contains the nodes of each facet or edge, its two ends first.

@@ -165,18 +165,18 @@ def union(*meshes: Mesh) -> Mesh:
         raise MeshError(f"union needs meshes of one dimension, not {[mesh.dim for mesh in meshes]}")
     first_numbers = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
     shifted = list(zip(meshes, first_numbers, strict=True))
-    cells = _by_name({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in shifted)
+    cells = _merge({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in shifted)
     starts = starts_of(cells)
     numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
         cells,
-        _by_name({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
-        _by_name({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in shifted),
+        _merge({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
+        _merge({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in shifted),
     )
 
 
-def _by_name(groups_of_meshes: Iterable[Groups]) -> Groups:
+def _merge(groups_of_meshes: Iterable[Groups]) -> Groups:
     """Return the concatenated arrays of several meshes by name."""
     by_name: dict[str, list[AnyArray]] = {}
     for groups in groups_of_meshes:

@@ -25,7 +25,7 @@ from fastcontact.elasticity.springs import Springs
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
-from fastcontact.errors import ModelError, Suggesting, check_known
+from fastcontact.errors import ModelError, NameSuggestions, check_known
 from fastcontact.heat.loads import Film, FixedTemperature, Heating
 from fastcontact.linear.sparse_rows import stacked_rows
 from fastcontact.mesh.mesh import Mesh
@@ -104,7 +104,7 @@ def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
 
 
 @typed(ModelError)
-class ModelBase(Suggesting):
+class ModelBase(NameSuggestions):
     """A model with a mesh, kinematics and materials, and with lists of the items that its subclasses add."""
 
     def __init__(
@@ -124,7 +124,7 @@ class ModelBase(Suggesting):
             raise ModelError(f"kinematics '{kinematics}' cannot be used with a {mesh.dim}D mesh: use {possible}")
         if not mesh.solids:
             raise ModelError(f"the mesh has no solid cells, only {', '.join(mesh.cells) or 'points'}")
-        ahead.expect([f"{mesh.dim}d"])
+        ahead.request_helpers([f"{mesh.dim}d"])
         check_cells(mesh)
         if kinematics == "axisymmetric":
             radius = mesh.points[:, 0].min()
@@ -360,6 +360,6 @@ class ModelBase(Suggesting):
                 raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
             if self.temperatures or self.heat_loads:
                 raise ModelError("forces of bodies with thermal expansion depend on the temperature: see step.reaction")
-            return bodies.at(np.reshape(displacement, shape), bodies.beginning).force
+            return bodies.at(np.reshape(displacement, shape), bodies.initial_history).force
         K = stiffness(self.mesh, self.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.elasticity.loads import axes_of, check_number
+from fastcontact.elasticity.loads import axis_values, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.elasticity.springs import grounded, joined
+from fastcontact.elasticity.springs import connecting_springs, ground_springs
 from fastcontact.errors import ModelError
 from fastcontact.model.couplings import Term, coupling, relation
 from fastcontact.model.parts.initial_states import ModelInitialStates
@@ -117,7 +117,7 @@ class ModelConnections(ModelInitialStates):
             raise ModelError(f"group '{group}' contains {len(nodes)} points: at least two are needed to couple")
         directions = [component] if component == NORMAL else list(dict.fromkeys(component))
         if component != NORMAL:
-            axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim)
+            axis_values(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim)
         for name in directions:
             ((nodes, vectors),) = directions_of(self.mesh, group, name)
             rows = relative_to_first(rows_along(nodes, vectors, self.n_dofs))
@@ -174,7 +174,7 @@ class ModelConnections(ModelInitialStates):
         for number in (value, *coefficients):
             check_number(f"a number of {name}", number)
         if component != NORMAL:
-            axes_of(name, dict.fromkeys(component, 1.0), self.mesh.dim)
+            axis_values(name, dict.fromkeys(component, 1.0), self.mesh.dim)
         table = table_of(ramp, f"the ramp of {name}")
         sides = [directions_of(self.mesh, group, component) for group in (first, second)]
         for (nodes, vectors), (opposite, opposite_vectors) in zip(*sides, strict=True):
@@ -233,8 +233,8 @@ class ModelConnections(ModelInitialStates):
         prescribed = {key: value for key, value in components.items() if value != 0.0}
         for key, value in prescribed.items():
             check_number(f"{key} of {name}", value)
-        jump: Any = axes_of(name, prescribed, self.mesh.dim) if prescribed else {}
-        free_axes = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
+        jump: Any = axis_values(name, prescribed, self.mesh.dim) if prescribed else {}
+        free_axes = sorted(axis_values(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
         if any(axis in jump for axis in free_axes):
             raise ModelError(f"{name}: '{free}' is free, so no displacement can be prescribed there")
         table = table_of(ramp, f"the ramp of {name}")
@@ -338,7 +338,7 @@ class ModelConnections(ModelInitialStates):
         check_number(f"the value of {name}", value)
         for point, component, coefficient in terms:
             check_number(f"a coefficient of {name}", coefficient)
-            (axis,) = axes_of(name, {component: coefficient}, self.mesh.dim)
+            (axis,) = axis_values(name, {component: coefficient}, self.mesh.dim)
             terms_of_nodes += [(int(node), axis, float(coefficient)) for node in self._nodes(point)]
         table = table_of(ramp, f"the ramp of {name}")
         constraint = relation(name, [terms_of_nodes], self.mesh.points.shape, float(value), table)
@@ -396,7 +396,7 @@ class ModelConnections(ModelInitialStates):
         >>> model.add_moment("HANDLE", z=20.0)
         """
         letters = "xyz"[: self.mesh.dim] if components is None else components
-        axes = axes_of(f"the coupling of '{reference}'", dict.fromkeys(letters, 1.0), self.mesh.dim)
+        axes = axis_values(f"the coupling of '{reference}'", dict.fromkeys(letters, 1.0), self.mesh.dim)
         weights = weighting, radius
         self.relations.append(coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes), weights))
 
@@ -449,8 +449,10 @@ class ModelConnections(ModelInitialStates):
         stiffness = {"axial": axial, "transverse": transverse}
         along_line = {key: value for key, value in stiffness.items() if value is not None}
         vector = self._direction(name, along_line, to is not None, direction)
-        axes = {} if along_line and {*components.values()} <= {None} else axes_of(name, components, self.mesh.dim)
-        for value in [*axes.values(), *along_line.values()]:
+        along_axes = (
+            {} if along_line and {*components.values()} <= {None} else axis_values(name, components, self.mesh.dim)
+        )
+        for value in [*along_axes.values(), *along_line.values()]:
             check_number(f"the stiffness of {name}", value)
             if not value > 0:
                 raise ModelError(f"{name}: the stiffness {value:g} must be positive")
@@ -461,7 +463,7 @@ class ModelConnections(ModelInitialStates):
         if opposite is None:
             if translation is not None:
                 raise ModelError(f"{name} acts on the ground: leave out the translation, or name the second group")
-            self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along_line, vector))
+            self.springs.append(ground_springs(name, nodes, along_axes, self.n_dofs, self.mesh.dim, along_line, vector))
             return
         if len(nodes) > 1 < len(opposite):
             match = matching_nodes(self.mesh, (str(group), nodes), (str(to), opposite), translation)
@@ -469,4 +471,4 @@ class ModelConnections(ModelInitialStates):
         elif translation is not None:
             raise ModelError(f"{name} connects all nodes with a single one: leave out the translation")
         first, second = np.broadcast_arrays(nodes, opposite)
-        self.springs.append(joined(name, self.mesh.points, (first, second), axes, along_line, vector))
+        self.springs.append(connecting_springs(name, self.mesh.points, (first, second), along_axes, along_line, vector))

@@ -23,7 +23,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
-from fastcontact.elasticity.loads import Value, axes_of, check_number
+from fastcontact.elasticity.loads import Value, axis_values, check_number
 from fastcontact.errors import ContactError, ModelError, check_known
 from fastcontact.model.contact_pair import ContactPair, DrivingForce, FluidPressure, method, rotation_of
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
@@ -31,7 +31,7 @@ from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions, pair_
 from fastcontact.model.parts.connections import ModelConnections
 from fastcontact.model.periodicity import representatives
 from fastcontact.model.ramp import History, table_of
-from fastcontact.model.repeated_pairs import check_repeated, share_facets
+from fastcontact.model.repeated_pairs import check_repeated_facets, share_facets
 
 if TYPE_CHECKING:
     from fastcontact.contact.found_contacts import FoundContacts
@@ -140,11 +140,11 @@ class ModelContact(ModelConnections):
         >>> model.contact[0].formulation
         'mortar'
         """
-        chosen: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
+        given_options: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
-            formulation, chosen, reason = default_formulation(self.mesh.dim, chosen)
-            log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
-        self._add_pair(ContactPair(name, secondary, primary, formulation, chosen))
+            formulation, given_options, reason = default_formulation(self.mesh.dim, given_options)
+            log.info("contact '%s': %s, since %s", name, method(formulation, given_options), reason)
+        self._add_pair(ContactPair(name, secondary, primary, formulation, given_options))
 
     def add_contacts(
         self,
@@ -192,22 +192,22 @@ class ModelContact(ModelConnections):
         1
         """
         moduli = self.contact_moduli() if self.materials else None
-        from fastcontact.contact.found_contacts import FoundContacts, find_contacts, nothing_found
+        from fastcontact.contact.found_contacts import FoundContacts, find_contacts, no_contacts_message
 
         contacts = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
         if not contacts.pairs:
-            raise ContactError(nothing_found(self.mesh, distance, angle, groups))
+            raise ContactError(no_contacts_message(self.mesh, distance, angle, groups))
         self.mesh, added = contacts.mesh, []
         for pair in contacts:
             secondary, primary = pair.secondary, pair.primary
-            ends = [self.mesh.points_of(group) for group in (secondary, primary)]
-            if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in ends):
+            sides = [self.mesh.points_of(group) for group in (secondary, primary)]
+            if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in sides):
                 continue
-            if any(share_facets(self.mesh, (secondary, primary), other) for other in self.contact):
+            if any(share_facets(self.mesh, (secondary, primary), earlier_pair) for earlier_pair in self.contact):
                 log.info("contact '%s' is left out, since another contact pairs its facets already", pair.name)
                 continue
             self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
-            self.contact[-1] = dataclasses.replace(self.contact[-1], found_gap=pair.gap[0])
+            self.contact[-1] = dataclasses.replace(self.contact[-1], detected_gap=pair.gap[0])
             added.append(pair)
         if not added and options:  # invalid options raise an error even if no pair is added
             trial = copy.copy(self)
@@ -318,7 +318,7 @@ class ModelContact(ModelConnections):
         """
         from fastcontact.contact.obstacles.meshed import MeshedSurface
 
-        components = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
+        components = axis_values(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(components.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
         if not np.isfinite(displacement).all():
             raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
@@ -326,17 +326,17 @@ class ModelContact(ModelConnections):
             obstacle.check_apart(self.mesh)
         obstacle.distance(self.mesh.points[:1])  # raises an error for a wrong dimension
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
-        chosen: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
+        given_options: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             kinds = self._facet_kinds(secondary)
-            formulation, chosen, reason = against_obstacle(self.mesh.dim, *kinds, chosen)
-            log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
+            formulation, given_options, reason = against_obstacle(self.mesh.dim, *kinds, given_options)
+            log.info("contact '%s': %s, since %s", name, method(formulation, given_options), reason)
         if formulation == "mortar":
-            chosen.setdefault("multipliers", "dual")
+            given_options.setdefault("multipliers", "dual")
         obstacle_force = self._driving_force(name, components, force)
         rotation_and_ramp = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
         motion_of_obstacle = displacement, history, obstacle_force, *rotation_and_ramp
-        self._add_pair(ContactPair(name, secondary, "", formulation, chosen, obstacle, *motion_of_obstacle))
+        self._add_pair(ContactPair(name, secondary, "", formulation, given_options, obstacle, *motion_of_obstacle))
 
     def _fluid_source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
         """Return the mask (n_points,) of the points at which fluid enters a contact pair, or None if it has no fluid."""
@@ -372,7 +372,7 @@ class ModelContact(ModelConnections):
         """
         if not force:
             return ()
-        forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
+        forces = axis_values(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
         for axis, value in forces.items():
             check_number(f"the force {'xyz'[axis]} on obstacle '{name}'", value)
             if axis in motion:
@@ -391,13 +391,13 @@ class ModelContact(ModelConnections):
 
     def _add_pair(self, pair: ContactPair) -> None:
         """Add a contact pair after checking it alone and together with the other pairs."""
-        if pair.name in {other.name for other in self.contact}:
+        if pair.name in {earlier_pair.name for earlier_pair in self.contact}:
             raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
         bound = self.bind(pair)
         if isinstance(bound.primary, RigidSide):
             check_obstacle(self.mesh, pair.name, bound.secondary, bound.primary)
-        for other in self.contact:
-            check_repeated(self.mesh, pair, other)
+        for earlier_pair in self.contact:
+            check_repeated_facets(self.mesh, pair, earlier_pair)
         self.contact.append(pair)
 
     def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
@@ -425,7 +425,7 @@ class ModelContact(ModelConnections):
         options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=has_obstacle)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
-            if not kind.against_obstacles:
+            if not kind.allows_obstacles:
                 raise ContactError(f"contact '{pair.name}': mortar in 2D needs multipliers='dual' at an obstacle")
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
             specific.setdefault("surface_smoothing", False)
@@ -436,9 +436,10 @@ class ModelContact(ModelConnections):
         axisymmetric = self.kinematics == "axisymmetric"
         interfaces = [interface for interface in self.periodic_interfaces if interface.turn is None or sectors_alike]
         points = secondary.points
-        turning = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
+        sector_rotation = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
         options = dataclasses.replace(
-            options, representatives=representatives(interfaces, self.mesh.n_points), turning=turning,
+            options, representatives=representatives(interfaces, self.mesh.n_points), sector_rotation=sector_rotation,
             source=self._fluid_source(pair, secondary, options),
         )  # fmt: skip
-        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)
+        sides = secondary, primary, self.mesh.points
+        return kind(*sides, axisymmetric, modulus, options=options, held_motions=held, **specific)

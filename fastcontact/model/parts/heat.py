@@ -179,7 +179,7 @@ class ModelHeat(ModelBase):
         """Return the heat conduction problem of the solid cells."""
         return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
 
-    def same_temperature(self) -> Indices:
+    def nodes_of_temperatures(self) -> Indices:
         """Return for each node (n_points,) the first of the nodes that share its temperature.
 
         Nodes share their temperature at the ends of a period or sector and on the two sides of a pretension section.
@@ -192,28 +192,28 @@ class ModelHeat(ModelBase):
         """Return the mask (n_points,) of nodes with a prescribed temperature, and their rises at multiplier 1, by history.
 
         Rises above the reference temperature have the shape (n_points,) [temperature]. Of nodes that share their
-        temperature only the first is marked, see `same_temperature`. Raises ModelError if two prescribed temperatures differ
-        at a node.
+        temperature only the first is marked, see `nodes_of_temperatures`. Raises ModelError if two prescribed temperatures
+        differ at a node.
         """
         fixed, values = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
         by_ramp: dict[Table | None, Array] = {}
-        owner = np.full(self.mesh.n_points, -1)
+        support_number = np.full(self.mesh.n_points, -1)
         supports = [load for load in self.heat_loads if isinstance(load, FixedTemperature)]
-        same = self.same_temperature()
+        shared_node = self.nodes_of_temperatures()
         for number, support in enumerate(supports):
             nodes = self.mesh.points_of(support.group)
             rise = evaluated(support.value, self.mesh.points[nodes], support.name) - self.reference_temperature
-            nodes = same[nodes]
+            nodes = shared_node[nodes]
             repeated = np.flatnonzero(fixed[nodes])
             for row in repeated[(values[nodes[repeated]] != rise[repeated])][:1]:
-                other = supports[owner[nodes[row]]]
-                groups = f"'{support.group}' and '{other.group}'"
+                earlier_support = supports[support_number[nodes[row]]]
+                groups = f"'{support.group}' and '{earlier_support.group}'"
                 raise ModelError(f"{groups} prescribe different temperatures at point {nodes[row]}")
-            new, (ramp, initial_ramp) = nodes[~fixed[nodes]], support.history()
-            by_ramp.setdefault(ramp, np.zeros(self.mesh.n_points))[new] = rise[~fixed[nodes]]
+            new_nodes, (ramp, initial_ramp) = nodes[~fixed[nodes]], support.history()
+            by_ramp.setdefault(ramp, np.zeros(self.mesh.n_points))[new_nodes] = rise[~fixed[nodes]]
             if support.reached is not None and initial_ramp:
-                by_ramp.setdefault(initial_ramp, np.zeros(self.mesh.n_points))[new] = support.reached[new]
-            fixed[nodes], values[nodes], owner[new] = True, rise, number
+                by_ramp.setdefault(initial_ramp, np.zeros(self.mesh.n_points))[new_nodes] = support.reached[new_nodes]
+            fixed[nodes], values[nodes], support_number[new_nodes] = True, rise, number
         return fixed, by_ramp
 
     def check_heat(self) -> None:
@@ -241,7 +241,7 @@ class ModelHeat(ModelBase):
             if isinstance(load, Film):
                 determined[self.mesh.points_of(load.group)] = True
         _, body = bodies(self.mesh)
-        links = [np.stack([np.arange(len(body)), self.same_temperature()], axis=1)]
+        links = [np.stack([np.arange(len(body)), self.nodes_of_temperatures()], axis=1)]
         for pair in self.contact:
             if pair.options.get("obstacle_temperature") is not None:
                 determined[self.mesh.points_of(pair.secondary)] = True

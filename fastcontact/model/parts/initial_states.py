@@ -73,17 +73,17 @@ class ModelInitialStates(ModelLoads):
         >>> model.add_temperature(lambda points: 10.0 * points[:, 1], "BLOCK")
         """
         names = group_names(groups)
-        is_array = isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) > 0
-        checked = np.array(value, float) if is_array else value
+        if isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) > 0:
+            value = np.array(value, float)
         reference = self.reference_temperature if reference is None else reference
         if times is not None:
             if ramp is not None:
                 raise ModelError("give either times or ramp for a temperature, not both")
-            if not isinstance(checked, np.ndarray) or checked.ndim != 2:
+            if not isinstance(value, np.ndarray) or value.ndim != 2:
                 raise ModelError("a temperature with times must be an array (n_instants, n_points)")
-            temperatures = temperature_history(names, checked, reference, times)
+            temperatures = temperature_history(names, value, reference, times)
         else:
-            temperatures = [Temperature(names, checked, reference, table_of(ramp, "the ramp of the temperature"))]
+            temperatures = [Temperature(names, value, reference, table_of(ramp, "the ramp of the temperature"))]
         for temperature in temperatures:
             temperature.check(self.mesh)
         self.temperatures += temperatures
@@ -315,7 +315,7 @@ class ModelInitialStates(ModelLoads):
         return by_ramp
 
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
-        """Return the nodal forces (n_points, dim) [force] of a stress offset."""
+        """Return the nodal forces (n_points, dim) [force] equivalent to a stress offset: minus the internal forces of it."""
         u, treatment = np.zeros(self.mesh.points.shape), field.treatment
         stress = stress_at_points(self.mesh, self.kinematics, field.moduli, field.moduli_rows, u, treatment, offset)
         return -internal_force(self.mesh, self.kinematics, stress)

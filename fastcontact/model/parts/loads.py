@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.elasticity import loads
-from fastcontact.elasticity.following_pressure import FollowingPressure
+from fastcontact.elasticity.following_pressure import FollowerPressure
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
-from fastcontact.elasticity.loads import Load, Pressure, Value, axes_of, check_number
+from fastcontact.elasticity.loads import Load, Pressure, Value, axis_values, check_number
 from fastcontact.errors import ModelError
 from fastcontact.model.checks import check_forces
 from fastcontact.model.couplings import Moment, Spread, SpreadForce
@@ -65,7 +65,7 @@ class ModelLoads(ModelHeat):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_traction("TOP", x=1.0, y=-5.0)
         """
-        axes = axes_of(f"the traction on '{group}'", components, self.mesh.dim)
+        axes = axis_values(f"the traction on '{group}'", components, self.mesh.dim)
         self._add(loads.Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
     def add_body_force(
@@ -91,7 +91,7 @@ class ModelLoads(ModelHeat):
         >>> model.add_body_force("BLOCK", x=lambda points: 1e-6 * points[:, 0])
         """
         names = group_names(groups)
-        axes = axes_of("the body force", components, self.mesh.dim)
+        axes = axis_values("the body force", components, self.mesh.dim)
         self._add(loads.BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
 
     def add_gravity(
@@ -119,7 +119,7 @@ class ModelLoads(ModelHeat):
         >>> model.add_gravity(y=-9810.0)
         """
         names = group_names(groups)
-        axes = axes_of("gravity", components, self.mesh.dim)
+        axes = axis_values("gravity", components, self.mesh.dim)
         self._add(Gravity(names, axes, table_of(ramp, "the ramp of gravity")))
 
     def add_centrifugal(
@@ -195,10 +195,10 @@ class ModelLoads(ModelHeat):
         >>> model.add_hydrostatic_pressure("RIGHT", weight=9.81e-6, level=0.8)
         """
         name = "xyz"[self.mesh.dim - 1] if axis is None else axis
-        (along,) = axes_of(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
+        (vertical,) = axis_values(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
         for quantity, value in (("weight", weight), ("level", level)):
             check_number(f"the {quantity} of the hydrostatic pressure on '{group}'", value)
-        self.add_pressure(group, loads.Hydrostatic(float(weight), float(level), along), ramp=ramp)
+        self.add_pressure(group, loads.Hydrostatic(float(weight), float(level), vertical), ramp=ramp)
 
     def add_force(
         self,
@@ -246,7 +246,7 @@ class ModelLoads(ModelHeat):
         """
         self.mesh.points_of(group)
         table = table_of(ramp, f"the ramp of the force on '{group}'")
-        axes = axes_of(f"the force on '{group}'", components, self.mesh.dim)
+        axes = axis_values(f"the force on '{group}'", components, self.mesh.dim)
         if at is None and (weighting != "uniform" or radius is not None):
             raise ModelError(
                 f"the force on '{group}' has a weighting or a radius, but no point from which distances are measured: give "
@@ -293,7 +293,7 @@ class ModelLoads(ModelHeat):
         >>> model.add_moment("TOP", z=20.0)
         """
         name = f"the moment on '{group}'"
-        axes = axes_of(name, moments, 3)
+        axes = axis_values(name, moments, 3)
         if self.mesh.dim == 2 and set(axes) != {2}:
             raise ModelError(f"{name}: in two dimensions a moment has the component z only")
         self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))
@@ -313,10 +313,10 @@ class ModelLoads(ModelHeat):
             by_ramp[load.ramp] = by_ramp.get(load.ramp, 0.0) + forces
         return by_ramp
 
-    def following_pressures(self) -> list[tuple[FollowingPressure, Table | None]]:
+    def following_pressures(self) -> list[tuple[FollowerPressure, Table | None]]:
         """Return the pressures, as loads that follow the deformed surface, with their histories."""
         pressures = [load for load in self.loads if isinstance(load, Pressure)]
-        return [(FollowingPressure(self.mesh, self.kinematics, load), load.ramp) for load in pressures]
+        return [(FollowerPressure(self.mesh, self.kinematics, load), load.ramp) for load in pressures]
 
     def load_vector(self, load: Load) -> Array:
         """Return the nodal forces (n_points, dim) [force] of a load at multiplier 1."""

@@ -14,7 +14,7 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.elasticity.loads import Value, axes_of, check_points, check_value, evaluated
+from fastcontact.elasticity.loads import Value, axis_values, check_points, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.symmetry_axis import axis_nodes
@@ -152,7 +152,7 @@ class ModelSupports(ModelContact):
             frame = frames(checked_axes(axes), positions, self.kinematics)
         except ModelError as error:
             raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
-        for axis, value in axes_of(name, components, dim).items():
+        for axis, value in axis_values(name, components, dim).items():
             direction = frame[:, axis]
             if dim == 2 and np.abs(direction[:, 2]).max() > SINGLE_PRECISION:
                 raise ModelError(f"{name}: its axes have components out of the plane of the model")
@@ -161,7 +161,7 @@ class ModelSupports(ModelContact):
 
     def _add_along(self, group: str, name: str, nodes: Indices, directions: Array, value: Any, ramp: History) -> None:
         """Prescribe the displacements of `nodes` (n,) along `directions` (n, dim) by multi-point constraints."""
-        value, table = _checked(name, value, table_of(ramp, f"the ramp of {name}"))
+        value, table = _checked_value(name, value, table_of(ramp, f"the ramp of {name}"))
         rows, positions = rows_along(nodes, directions, self.n_dofs), self.mesh.points[nodes]
         if isinstance(value, tuple):  # the displacement of each node has a separate history
             histories = zip(
@@ -183,10 +183,10 @@ class ModelSupports(ModelContact):
     ) -> None:  # fmt: skip
         """Add a support for each component of the displacement, after checking it."""
         check_points(self.mesh, group, "no displacement can be prescribed on it")
-        for axis, value in axes_of(f"the support of '{group}'", components, self.mesh.dim).items():
+        for axis, value in axis_values(f"the support of '{group}'", components, self.mesh.dim).items():
             name = displacement_name("xyz"[axis], group)
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
-            value, table = _checked(name, value, table, rotation is not None)
+            value, table = _checked_value(name, value, table, rotation is not None)
             self.supports.append(Support(group, axis, value, table, rotation, rotation_ramp))
 
     def prescribed(self) -> tuple[Mask, Array]:
@@ -207,14 +207,14 @@ class ModelSupports(ModelContact):
         by_ramp: dict[PartHistory, Array] = {}
         for number, support in enumerate(self.supports):
             nodes, k = self.mesh.points_of(support.group), support.component
-            histories, new = support.by_history(self.mesh.points[nodes]), ~fixed[nodes, k]
+            histories, is_new = support.by_history(self.mesh.points[nodes]), ~fixed[nodes, k]
             for history in {**by_ramp, **histories}:
                 total = by_ramp.setdefault(history, np.zeros(self.mesh.points.shape))
                 values = histories.get(history, np.zeros(len(nodes)))
-                different = np.flatnonzero((total[nodes, k] != values) & ~new)
+                different = np.flatnonzero((total[nodes, k] != values) & ~is_new)
                 if len(different):
                     self._raise_contradiction(number, int(nodes[different[0]]))
-                total[nodes[new], k] = values[new]
+                total[nodes[is_new], k] = values[is_new]
             fixed[nodes, k] = True
         self._fix_axis(fixed, by_ramp)
         return fixed, by_ramp
@@ -222,26 +222,27 @@ class ModelSupports(ModelContact):
     def _raise_contradiction(self, number: int, node: int) -> None:
         """Raise a ModelError which states that support `number` contradicts an earlier support at `node`."""
         support = self.supports[number]
-        for before in self.supports[:number]:
-            if before.component == support.component and node in self.mesh.points_of(before.group):
+        for first in self.supports[:number]:
+            if first.component == support.component and node in self.mesh.points_of(first.group):
                 break
-        value, other = (float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, before))
+        position = self.mesh.points[[node]]
+        value, first_value = (float(np.sum(list(s.by_history(position).values()))) for s in (support, first))
         axis = "xyz"[support.component]
         raise ModelError(
-            f"'{support.group}' prescribes {axis} = {value:g} at point {node}, but '{before.group}' "
-            f"prescribes {other:g} there{' with another ramp' if value == other else ''}: remove one of the two"
-            + (f", or give both histories as pairs: {axis}=[(0.5, f), (1.0, g)]" if support.ramp != before.ramp else "")
+            f"'{support.group}' prescribes {axis} = {value:g} at point {node}, but '{first.group}' "
+            f"prescribes {first_value:g} there{' with another ramp' if value == first_value else ''}: remove one of the two"
+            + (f", or give both histories as pairs: {axis}=[(0.5, f), (1.0, g)]" if support.ramp != first.ramp else "")
         )
 
     def _fix_axis(self, fixed: Mask, by_ramp: Mapping[PartHistory, Array]) -> None:
         """Fix the radial displacement at the axis of an axisymmetric model; raise ModelError if a support contradicts it."""
         axis = self.axis_nodes
         for values in by_ramp.values():
-            off = axis[np.abs(values[axis, 0]) > SINGLE_PRECISION * np.abs(values).max()]
-            if len(off):
+            nodes = axis[np.abs(values[axis, 0]) > SINGLE_PRECISION * np.abs(values).max()]
+            if len(nodes):
                 raise ModelError(
-                    f"x = {values[off[0], 0]:g} is prescribed at point {off[0]} on the axis of symmetry, where the radial "
-                    "displacement is zero: leave the points at x = 0 out of the group"
+                    f"x = {values[nodes[0], 0]:g} is prescribed at point {nodes[0]} on the axis of symmetry, where the "
+                    "radial displacement is zero: leave the points at x = 0 out of the group"
                 )
             values[axis, 0] = 0.0
         fixed[axis, 0] = True
@@ -259,7 +260,7 @@ class ModelSupports(ModelContact):
             log.info("axis of symmetry: x is fixed at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0])
 
 
-def _checked(name: str, value: Any, table: Table | None, rotates: bool = False) -> tuple[Any, Table | None]:
+def _checked_value(name: str, value: Any, table: Table | None, rotates: bool = False) -> tuple[Any, Table | None]:
     """Return a displacement and its history after checks: a number, a function, or a tuple of (load factor, displacement)."""
     if isinstance(value, Iterable):
         if table is not None or rotates:

@@ -16,7 +16,7 @@ from new_process import printed
 from fastcontact._jit import ahead, compiling, decorators
 from fastcontact.contact.search.box_tree_kernels import Tree
 
-jitted = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not compiled")
+jitted = pytest.mark.skipif(not decorators.jit_enabled(), reason="kernels are not compiled")
 
 
 @pytest.mark.parametrize("run", ["2d", "3d", "3d amg"])
@@ -62,7 +62,7 @@ def test_a_helper_leaves_kernels_on_disk_and_tells_each(tmp_path):
 
 @pytest.fixture
 def started(monkeypatch):
-    """What `expect` starts, in a process that has two threads and has compiled nothing yet."""
+    """What `request_helpers` starts, in a process that has two threads and has compiled nothing yet."""
     found = []
     monkeypatch.setattr(ahead, "start", lambda runs, helpers: found.append((runs, helpers)) or [])
     monkeypatch.setattr(ahead, "MAX_HELPERS", 3)
@@ -77,8 +77,8 @@ def started(monkeypatch):
 
 
 def test_help_comes_when_more_than_a_few_kernels_are_compiled(started):
-    ahead.expect(["2d"])
-    for _ in range(ahead.MAX_UNHELPED):
+    ahead.request_helpers(["2d"])
+    for _ in range(ahead.MAX_WITHOUT_HELPERS):
         compiling.notify()
     assert started == []
     compiling.notify()
@@ -87,16 +87,16 @@ def test_help_comes_when_more_than_a_few_kernels_are_compiled(started):
 
 
 def test_help_comes_at_once_where_many_were_compiled_before(started, monkeypatch):
-    monkeypatch.setattr(compiling, "count", ahead.MAX_UNHELPED + 1)
-    ahead.expect(["3d"])
+    monkeypatch.setattr(compiling, "count", ahead.MAX_WITHOUT_HELPERS + 1)
+    ahead.request_helpers(["3d"])
     assert started == [(["3d"], 1)]
 
 
 def test_help_comes_once_for_each_kind_of_runs(started, monkeypatch):
     monkeypatch.setattr(compiling, "count", 100)
     for _ in range(3):
-        ahead.expect(["2d"])
-    ahead.expect(["3d", "2d"])
+        ahead.request_helpers(["2d"])
+    ahead.request_helpers(["3d", "2d"])
     assert started == [(["2d"], 1), (["3d"], 1)]
 
 
@@ -104,7 +104,7 @@ def test_no_help_where_python_may_run_all_that_is_not_kept(started, monkeypatch)
     numbers = []
     monkeypatch.setattr(ahead, "_is_cached", lambda number: numbers.append(number) or True)
     monkeypatch.setattr(compiling, "count", 100)
-    ahead.expect(["2d"])
+    ahead.request_helpers(["2d"])
     assert started == []
     assert numbers == ahead.required_kernels(["2d"])
 
@@ -120,7 +120,7 @@ def test_no_help(started, monkeypatch, spoilt):
     else:
         monkeypatch.setattr(ahead.sys, "executable", "/opt/cad/cad")
     monkeypatch.setattr(compiling, "count", 100)
-    ahead.expect(["2d"])
+    ahead.request_helpers(["2d"])
     assert started == []
     assert compiling.helper_requests == []
 

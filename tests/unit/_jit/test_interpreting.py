@@ -16,7 +16,7 @@ from new_process import printed
 import fastcontact as fc
 from fastcontact._jit import cache, decorators, interpreting
 
-pytestmark = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not compiled")
+pytestmark = pytest.mark.skipif(not decorators.jit_enabled(), reason="kernels are not compiled")
 
 # Operations whose results IEEE 754 tells, and what makes and tells arrays. No powers, angles or sums of arrays.
 KNOWN = {
@@ -30,7 +30,7 @@ def interpretable():
     for module in pkgutil.walk_packages(fc.__path__, "fastcontact."):
         if module.name.endswith("_kernels"):
             for name, kernel in vars(importlib.import_module(module.name)).items():
-                if isinstance(kernel, interpreting.Interpretable) and kernel.__module__ == module.name:
+                if isinstance(kernel, interpreting.InterpretableKernel) and kernel.__module__ == module.name:
                     yield module.name, name, kernel
 
 
@@ -67,7 +67,9 @@ def test_no_kernel_calls_one_that_python_may_run():
         for kernel in [kernel for kernel in vars(place).values() if hasattr(kernel, "py_func")] if place else []:
             known = kernel.py_func.__globals__
             called = [name for name in kernel.py_func.__code__.co_names if name in known]
-            assert not [name for name in called if isinstance(known[name], interpreting.Interpretable)], kernel.__name__
+            assert not [name for name in called if isinstance(known[name], interpreting.InterpretableKernel)], (
+                kernel.__name__
+            )
 
 
 def same(one, other):
@@ -82,7 +84,7 @@ def both(kernel, compared):
 
     def call(*arguments):
         before = copy.deepcopy(arguments)
-        if interpreting.entries(arguments) == np.inf:
+        if interpreting.n_entries(arguments) == np.inf:
             return kernel(*arguments)
         result, again = kernel(*arguments), interpreting.interpret(kernel, before)
         assert same(result, again), kernel.__name__
@@ -122,7 +124,7 @@ def test_runs_have_the_same_bits(make, element, formulation, least, monkeypatch)
     fc.solve(model, 1, linear_solver="direct")  # compiles what a replaced kernel could not be compiled into
     for module in [module for name, module in sys.modules.items() if name.startswith("fastcontact.")]:
         for name, value in list(vars(module).items()):
-            if isinstance(value, interpreting.Interpretable):
+            if isinstance(value, interpreting.InterpretableKernel):
                 monkeypatch.setattr(module, name, both(value, compared))
     fc.solve(model, 1, linear_solver="direct")
     assert len(compared) >= least, sorted(compared)
@@ -177,8 +179,8 @@ def test_only_files_of_the_kernel_as_it_is_now_count(tmp_path):
 
 
 def test_entries_of_small_types_are_none_that_python_may_compute():
-    assert interpreting.entries((np.zeros((2, 3)), 1.0, (np.zeros(4, np.int32), True))) == 12
-    assert interpreting.entries((np.zeros(2, np.float32),)) == np.inf
+    assert interpreting.n_entries((np.zeros((2, 3)), 1.0, (np.zeros(4, np.int32), True))) == 12
+    assert interpreting.n_entries((np.zeros(2, np.float32),)) == np.inf
 
 
 def test_a_division_by_zero_is_as_in_compiled_code():

@@ -17,7 +17,7 @@ from pairwise import first_of
 import fastcontact
 from fastcontact._jit import cache, compiling, decorators
 
-jitted = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not compiled")
+jitted = pytest.mark.skipif(not decorators.jit_enabled(), reason="kernels are not compiled")
 CALLER = """
 from callee import part
 from fastcontact._jit.decorators import kernel
@@ -213,7 +213,7 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def told(monkeypatch):
     """What a process that has compiled nothing yet says when two kernels are compiled, given its error output."""
-    monkeypatch.setattr(compiling, "_reported", False)
+    monkeypatch.setattr(compiling, "_announced", False)
     monkeypatch.setattr(compiling, "listeners", [compiling.print_announcement])
     monkeypatch.setattr(compiling.log, "handlers", [])  # those of other tests may be closed
     monkeypatch.setattr(compiling.log, "propagate", False)
@@ -231,12 +231,12 @@ def told(monkeypatch):
 
 
 def test_one_line_at_a_terminal(told):
-    assert told(Terminal()) == f"fastcontact: {compiling.TEXT}\n"
+    assert told(Terminal()) == f"fastcontact: {compiling.ANNOUNCEMENT}\n"
 
 
 def test_one_line_in_a_notebook(told, monkeypatch):
     monkeypatch.setitem(sys.modules, "ipykernel", compiling)
-    assert told(io.StringIO()) == f"fastcontact: {compiling.TEXT}\n"
+    assert told(io.StringIO()) == f"fastcontact: {compiling.ANNOUNCEMENT}\n"
 
 
 def test_nothing_where_nobody_waits(told, monkeypatch):

@@ -72,9 +72,9 @@ def test_parts_work_on_equally_many_cells(threads, element):
 
 def test_a_fifth_of_the_cells_is_worthwhile_with_five_times_the_nodes(monkeypatch):
     monkeypatch.setattr(_jit, "threads", lambda: 2)
-    little = parallel.SINGLE_THREAD_WORK // (5 * parallel.NODES)
-    assert len(parallel.portions(little, 5 * parallel.NODES)) == 1
-    assert len(parallel.portions(little + 1, 5 * parallel.NODES)) == 2
+    little = parallel.SINGLE_THREAD_WORK // (5 * parallel.NODES_PER_CELL)
+    assert len(parallel.portions(little, 5 * parallel.NODES_PER_CELL)) == 1
+    assert len(parallel.portions(little + 1, 5 * parallel.NODES_PER_CELL)) == 2
 
 
 def test_rows_are_spread_over_threads_and_an_error_in_one_of_them_is_raised(threads):

@@ -165,7 +165,7 @@ def test_constraints_that_repeat_each_other_are_solved_on_their_compliance(caplo
 
 def test_a_matrix_too_large_for_factors_stays_an_error(monkeypatch):
     monkeypatch.setattr(solver, "MAX_ITERATIONS", 0)
-    monkeypatch.setattr(amg, "AFFORDABLE", {3: 10})
+    monkeypatch.setattr(amg, "MAX_FACTORISED_DOFS", {3: 10})
     with pytest.raises(fc.ConvergenceError, match="conjugate gradients stall at"):
         fc.solve(small_blocks(0.0), fc.linear_ramp(1), linear_solver="amg", criteria=fc.Criteria(max_halvings=0))
 

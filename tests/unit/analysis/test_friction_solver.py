@@ -41,7 +41,7 @@ def componentwise(C, along):
     rows = csr_array((m, m * dim))
     positions = np.zeros((m, dim))
     constraints = Constraints(rows, np.zeros(m), positions, DenseCompliance(C), k * (rows,), tuple(along))
-    friction._add_compliance(F, constraints, np.arange(m))
+    friction._add_compliance(F, constraints, np.arange(m), np.arange(len(F)))
     return F
 
 
@@ -94,11 +94,14 @@ def test_tangents_turn_to_the_slip_that_supports_leave():
     held = [0, 3]
     K_inverse[held], K_inverse[:, held] = 0.0, 0.0
     F = R @ K_inverse @ R.T
-    assert not len(np.flatnonzero(held_tangents(compliance_of_each(F, 3))))
-    Q = aligning_rotation(compliance_of_each(F, 3))
+    number = np.arange(6).reshape(3, 2)
+    assert not len(np.flatnonzero(held_tangents(compliance_of_each(F, number))))
+    Q = aligning_rotation(compliance_of_each(F, number))
     np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(6), atol=1e-15)
-    np.testing.assert_array_equal(held_tangents(compliance_of_each(Q @ (Q @ F).T, 3)), [[False, False], [True, True]])
-    assert aligning_rotation(compliance_of_each(R @ (A @ A.T) @ R.T, 3)) is None
+    np.testing.assert_array_equal(
+        held_tangents(compliance_of_each(Q @ (Q @ F).T, number)), [[False, False], [True, True]]
+    )
+    assert aligning_rotation(compliance_of_each(R @ (A @ A.T) @ R.T, number)) is None
 
 
 def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
@@ -172,6 +175,21 @@ def test_a_guess_does_not_leave_the_gap_of_a_soft_constraint_open():
     forces = dense.solve(F, free, np.array([0.3, 0.3]), np.ones(2, bool), guess)
     assert forces.settled
     np.testing.assert_allclose(forces.gaps[0], 0.0, atol=1e-14)
+
+
+def test_components_without_friction_need_no_rows():
+    rng, m = np.random.default_rng(6), 8
+    A, mu = rng.normal(size=(3 * m, 3 * m)), np.array(4 * [0.0, 0.4])
+    free = np.vstack([rng.normal(0.0, 4.0, m), np.where(mu > 0.0, rng.normal(size=(2, m)), 0.0)])
+    components = np.flatnonzero(np.vstack([np.ones(m), mu, mu]))
+    given, F = np.ix_(components, components), np.eye(3 * m)
+    F[given] = (A @ A.T)[given]
+    whole = dense.solve(F, free, mu, free[0] < 0.0)
+    part = dense.solve(F[given], free, mu, free[0] < 0.0, components=components)
+    assert part.settled
+    assert 2 < part.closed.sum() < m
+    np.testing.assert_allclose(part.y, whole.y, atol=1e-12 * np.abs(whole.y).max())
+    np.testing.assert_allclose(part.gaps.ravel()[components], whole.gaps.ravel()[components], atol=1e-11)
 
 
 def test_pivots_against_all_bases():

@@ -261,7 +261,7 @@ def test_a_strengthened_multigrid_cycle_is_remembered():
     model, ramp = spheres("continuous"), fc.linear_ramp(3)
     analysis = Stepping(model, "amg", 1e-10, fc.Criteria(), ramp)
     analysis.step(1, 0.5)
-    analysis.solver._strengthen(4)
+    analysis.solver._make_definite(4)
     hierarchy = analysis.solver.hierarchy
     hierarchy.bounds = [1.3 * bound for bound in hierarchy.bounds]
     memory = analysis.solver.snapshot()

@@ -40,7 +40,7 @@ def test_materials_of_all_kinds_reach_the_model(tmp_path):
 
 def test_constants_that_vary_reach_the_model(tmp_path):
     found = material(tmp_path, "E = {along = 'y', table = [[0.0, 100.0], [1.0, 300.0]]}\nnu = 0.3")
-    assert found.E.given == fc.Tabulated("y", [(0.0, 100.0), (1.0, 300.0)])
+    assert found.E.source == fc.Tabulated("y", [(0.0, 100.0), (1.0, 300.0)])
     found = material(tmp_path, WOOD.replace("10800", "{along = 'radius', table = [[0.5, 9000], [1, 12000]]}"))
     assert found.E[0].range == pytest.approx((9000.0, 12000.0), rel=0.3)
     assert found.E[1:] == (700.0, 430.0)
@@ -48,7 +48,7 @@ def test_constants_that_vary_reach_the_model(tmp_path):
     assert found.E == 1.0
     assert found.density.range[1] < 2.0
     found = material(tmp_path, "E = 1.0\nnu = 0.3\nexpansion = {along = 'x', table = [[0, 1e-5], [1, 2e-5]]}")
-    assert found.expansion.given == fc.Tabulated("x", [(0.0, 1e-5), (1.0, 2e-5)])
+    assert found.expansion.source == fc.Tabulated("x", [(0.0, 1e-5), (1.0, 2e-5)])
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from refusals import refused
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, stored_description
-from fastcontact.cases.checks import Check, evaluated, measured, read_check
-from fastcontact.cases.summary import lines, of_step, summarise
+from fastcontact.cases.checks import Check, outcome, quantity_value, read_check
+from fastcontact.cases.summary import lines, step_entry, summarise
 
 HERTZ = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.0)
 SLIP = fc.analytic.cattaneo_mindlin_line(
@@ -57,7 +57,7 @@ def check(**entry):
 )
 def test_every_quantity_is_measured_in_its_unit(quantity, value, unit):
     found = check(quantity=quantity, value=1.0)
-    assert found.factor * measured(found.quantity, step(), PROBES) == pytest.approx(value, rel=1e-15)
+    assert found.factor * quantity_value(found.quantity, step(), PROBES) == pytest.approx(value, rel=1e-15)
     assert found.unit == unit
 
 
@@ -73,7 +73,7 @@ def test_targets_come_from_the_theory_or_are_documented():
 
 
 def test_the_force_of_a_quarter_counts_four_times():
-    found = evaluated(check(quantity="hertz.force", theory="hertz"), step(), PROBES, THEORIES)
+    found = outcome(check(quantity="hertz.force", theory="hertz"), step(), PROBES, THEORIES)
     assert found["value"] == pytest.approx(4.4)
     assert found["target"] == 4.0
     assert found["deviation"] == pytest.approx(0.1)
@@ -84,9 +84,9 @@ def test_the_force_of_a_quarter_counts_four_times():
 def test_a_check_passes_within_its_tolerance_only():
     for tolerance, passed in ((0.11, True), (0.09, False)):
         entry = {"quantity": "hertz.force", "theory": "hertz", "tolerance": tolerance}
-        assert evaluated(check(**entry), step(), PROBES, THEORIES)["passed"] is passed
+        assert outcome(check(**entry), step(), PROBES, THEORIES)["passed"] is passed
     inside = check(quantity="inside.pressure", value=1.0)  # a point that is in no contact
-    result = evaluated(inside, step(), {**PROBES, "inside": 4}, THEORIES)
+    result = outcome(inside, step(), {**PROBES, "inside": 4}, THEORIES)
     assert np.isnan(result["value"])
     assert result["passed"] is False
 
@@ -94,17 +94,17 @@ def test_a_check_passes_within_its_tolerance_only():
 def test_the_distance_to_the_mesh_converged_solution_is_told():
     better = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.2)
     theories = {"hertz": {**THEORIES["hertz"], "mesh_converged": better}}
-    found = evaluated(check(quantity="hertz.force", theory="hertz"), step(), PROBES, theories)
+    found = outcome(check(quantity="hertz.force", theory="hertz"), step(), PROBES, theories)
     assert found["distance_to_mesh_converged"] == pytest.approx(4.4 / 4.2 - 1)
     assert found["mesh_converged_deviation"] == pytest.approx(0.05)
 
 
 def test_it_says_what_is_compared():
-    assert check(quantity="pole.pressure", theory="hertz").described() == (
+    assert check(quantity="pole.pressure", theory="hertz").description() == (
         "pole.pressure against the theory's pressure_max within 0.1"
     )
     found = Check("c", "pole.pressure", 0.1, value=2.5, source="a book")
-    assert found.described() == "pole.pressure against 2.5 (a book) within 0.1"
+    assert found.description() == "pole.pressure against 2.5 (a book) within 0.1"
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def steps():
 
 def summary(text, steps):
     case = build_case(tomllib.loads(text), name="drum")
-    return summarise(case, steps[-1], [of_step(step) for step in steps], {}, [])
+    return summarise(case, steps[-1], [step_entry(step) for step in steps], {}, [])
 
 
 def test_a_mesh_maker_with_lists_makes_the_mesh_of_a_case(steps):

@@ -60,7 +60,7 @@ FURTHER = [math.inf, -1, 1e300, "", True, [], {}, [[0.0, math.nan], [1.0, 1.0]],
 
 def places():
     """Yield every key of a case file, by the path to it: a table, a number of its list or None, and the key."""
-    for key in [*keys.TOP, *LISTS, "unknown_key"]:
+    for key in [*keys.TOP_LEVEL, *LISTS, "unknown_key"]:
         yield key, lambda data, key=key: (data, key)
     tables = {"solve": keys.SOLVE, "units": keys.UNITS, "study": keys.STUDY, "modes": keys.MODES, "ramp": keys.RAMP}
     for name, known in tables.items():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.contact.formulations import _cut_faces_kernels
-from fastcontact.contact.formulations._dual_basis import LARGEST_RMS, dual_functions, positive
+from fastcontact.contact.formulations._dual_basis import LARGEST_RMS, dual_functions, positive_basis
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.mesh import elements, quadrature
@@ -227,7 +227,7 @@ def rule(polygon):
 
 def mass_over(name, polygon):
     xi, w = rule(polygon)
-    N = elements.get(name).shape(xi) @ positive(name).T
+    N = elements.get(name).shape(xi) @ positive_basis(name).T
     return np.einsum("q,qa,qb->ab", w, N, N)
 
 
@@ -240,7 +240,7 @@ def test_the_positive_functions_are_positive_and_sum_to_one(name):
     else:
         xi = np.array([[a, b] for a in steps for b in steps])
         xi = xi[xi.sum(axis=1) <= 1 + 1e-12] if element.n_corners == 3 else 2 * xi - 1
-    N = element.shape(xi) @ positive(name).T
+    N = element.shape(xi) @ positive_basis(name).T
     assert N.min() > -1e-15
     assert N.sum(axis=1) == pytest.approx(1.0, abs=1e-14)
     weights = mass_over(name, corners(name)).sum(axis=1)
@@ -252,14 +252,14 @@ def test_they_are_the_polynomials_of_bernstein(name):
     """Of the degree-2 Bernstein polynomials, the one of a corner is the square of its linear function."""
     xi, _ = rule(corners(name))
     element = elements.get(name)
-    N = element.shape(xi) @ positive(name).T
+    N = element.shape(xi) @ positive_basis(name).T
     assert N[:, : element.n_corners] == pytest.approx(elements.get(element.linear).shape(xi) ** 2, abs=1e-14)
 
 
 @pytest.mark.parametrize("name", FACETS)
 def test_the_displacement_of_a_gap_is_that_of_one_node_and_of_the_ends_of_its_edge(name):
     """What makes the elimination triangular: corners first, then mid nodes, then centres."""
-    back = np.linalg.inv(positive(name)).T
+    back = np.linalg.inv(positive_basis(name)).T
     assert np.array_equal(np.triu(back, 1), np.zeros_like(back))
     assert np.diag(back).min() >= 1.0
     assert back.sum(axis=1) == pytest.approx(1.0, abs=1e-13)

@@ -10,7 +10,7 @@ import fastcontact as fc
 from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.held_motions import deflate, direction_fields, eigenspaces
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, rows_along
-from fastcontact.contact.projection import places
+from fastcontact.contact.projection import facet_points
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
 from fastcontact.model.rigid_motions import cone_rows
@@ -144,7 +144,7 @@ def test_places_on_one_kind_of_facets_are_those_of_its_element(sides):
     _, side, _ = sides
     rng = np.random.default_rng(4)
     facet, xi = rng.integers(0, side.n_facets, 9), rng.uniform(-1, 1, (9, 1))
-    at, element = places(side, facet, xi), elements.get(side.only_block.element)
+    at, element = facet_points(side, facet, xi), elements.get(side.only_block.element)
     np.testing.assert_array_equal(at.nodes, side.only_block.facets[facet])
     np.testing.assert_array_equal(side.points[at.local], at.nodes)
     np.testing.assert_array_equal(at.shape, element.shape(xi))

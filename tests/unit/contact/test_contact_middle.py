@@ -10,7 +10,7 @@ import fastcontact as fc
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import main
 from fastcontact.cli._results import pressure_curves
-from fastcontact.contact.contact_middle import unrolled
+from fastcontact.contact.contact_middle import unrolled_line
 from fastcontact.contact.surface import surface
 from fastcontact.results.step import half_width
 
@@ -132,13 +132,13 @@ def test_a_closed_line_is_cut_open_opposite_to_the_contact():
     lines = np.array([[24 + i, 24 + (i + 1) % 24] for i in range(24)])
     mesh = fc.Mesh(ring, {"quad4": quads, "line2": lines}, {"OUT": 24 + np.arange(24)}, {})
     side = surface(mesh, "OUT")
-    line = unrolled(side, mesh.points, np.array([2.0, 0.0]))
+    line = unrolled_line(side, mesh.points, np.array([2.0, 0.0]))
     assert line is not None
     assert line.closed
     np.testing.assert_allclose(line.nodes[0], [-2.0, 0.0], atol=1e-12)
     lengths = line.lengths(mesh.points[side.points])
     assert len(np.unique(np.round(lengths, 9))) == 24
-    np.testing.assert_allclose(line.at(0.5 * line.length), [2.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(line.point_at(0.5 * line.length), [2.0, 0.0], atol=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [0.001, 30.0, 90.0])

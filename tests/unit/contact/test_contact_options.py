@@ -8,7 +8,7 @@ from refusals import refused
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
-from fastcontact.cases.summary import lines, of_step, summarise
+from fastcontact.cases.summary import lines, step_entry, summarise
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 
 MESH = 'generator = "block-on-block"\nelement = "quad4"\ndivisions_lower = [3, 2]\ndivisions_upper = [3, 2]'
@@ -58,7 +58,7 @@ def test_the_summary_tells_the_penetration(tmp_path):
     path.write_text(CASE + "penalty = 1e5\n")
     case = read_case(path)
     steps = fc.solve(case.model, case.ramp)
-    summary = summarise(case, steps[-1], [of_step(step) for step in steps], {}, [])
+    summary = summarise(case, steps[-1], [step_entry(step) for step in steps], {}, [])
     pressure = 0.02 / (10 * 0.91e-3 + 1e-5)
     assert summary["contact"]["pair"]["penetration"] == pytest.approx(pressure / 1e5, rel=1e-8)
     assert summary["contact"]["pair"]["penalty"] == 1e5

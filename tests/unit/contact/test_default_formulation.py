@@ -150,7 +150,7 @@ def test_triangles_under_a_ball_have_no_oscillating_pressure():
 
 
 def test_a_dense_matrix_too_large_to_be_of_use_is_refused(monkeypatch):
-    monkeypatch.setattr(multiplier_field, "MOST_ROWS", 20)
+    monkeypatch.setattr(multiplier_field, "MAX_ROWS", 20)
     with pytest.raises(
         fc.ContactError,
         match=r"closes \d+ integration points at once.*use formulation='mortar' with multipliers='dual'",

@@ -11,11 +11,11 @@ from fastcontact.contact.pairing import pair
 from fastcontact.contact.projection import (
     along_line_normals,
     along_normals,
-    closest_of_kinds,
+    closest_of_types,
     facet_normals,
+    facet_points,
     interpolate,
     nodal_normals,
-    places,
     smooth_normals,
 )
 from fastcontact.contact.surface import surface
@@ -35,12 +35,12 @@ def wavy(element, n=8):
 def projected(candidates, side, points, project=along_normals):
     """Return the normals at the nodes of facets, the closest points, and the projection along the normals."""
     normals = smooth_normals(side, points)
-    start = closest_of_kinds(candidates, side.node_positions(points))
+    start = closest_of_types(candidates, side.node_positions(points))
     return normals, start, project(candidates, side, points, normals, start)
 
 
 def feet(side, points, facet, xi):
-    at = places(side, facet, xi)
+    at = facet_points(side, facet, xi)
     return np.einsum("nk,nkd->nd", at.shape, points[at.nodes])
 
 
@@ -175,7 +175,7 @@ def test_points_lie_along_the_normal_of_their_projection_of_projection_kernels(e
     points, candidates = points + shift, above(200, beside=-0.1) + shift
     normals, _, (facet, xi, overhang, normal) = projected(candidates, side, points)
     assert (overhang == 0.0).all()
-    assert normal == pytest.approx(interpolate(normals[facet], places(side, facet, xi)), abs=1e-13)
+    assert normal == pytest.approx(interpolate(normals[facet], facet_points(side, facet, xi)), abs=1e-13)
     assert np.abs(np.cross(candidates - feet(side, points, facet, xi), normal)).max() < 1e-12 * max(1.0, shift)
 
 
@@ -213,7 +213,7 @@ def test_where_no_step_is_possible_the_closest_point_stays():
     points, side = rough("hex8", 2, 0.0)
     normals = np.tile([1.0, 0.0, 0.0], (side.n_facets, 4, 1))  # along the facets
     candidates = above(20, beside=-0.1)
-    start = closest_of_kinds(candidates, side.node_positions(points))
+    start = closest_of_types(candidates, side.node_positions(points))
     facet, xi, _, _ = along_normals(candidates, side, points, normals, start)
     assert (facet == start.facet).all()
     assert (xi == start.xi).all()
@@ -239,7 +239,7 @@ def test_corners_are_taken_one_by_one():
     assert normals == pytest.approx(facet_normals(side.blocks[0], mesh.points), abs=1e-15)
 
 
-@pytest.mark.skipif(not decorators.compiled(), reason="one thread interprets")
+@pytest.mark.skipif(not decorators.jit_enabled(), reason="one thread interprets")
 def test_threads_change_no_bit(monkeypatch):
     points, side = mixed()
     candidates = above(200)
@@ -256,5 +256,5 @@ def test_reference_coordinates_in_and_beyond_a_facet():
         (True, 0.2, 0.3, 0.0, (0.2, 0.3)), (True, 0.9, 0.6, 0.5, (0.6, 0.4)), (True, -0.25, 0.5, 0.25, (0.0, 0.4)),
         (False, 0.2, -0.3, 0.0, (0.2, -0.3)), (False, 1.5, 0.0, 0.25, (1.0, 0.0)), (False, -2.0, 3.0, 1.0, (-1.0, 1.0)),
     ):  # fmt: skip
-        assert projection_kernels.beyond(triangle, s, t) == pytest.approx(out)
+        assert projection_kernels.overhang_of(triangle, s, t) == pytest.approx(out)
         assert projection_kernels.clamped(triangle, s, t) == pytest.approx(kept)

@@ -11,7 +11,7 @@ from fastcontact.contact.formulations.continuous import Continuous
 from fastcontact.contact.formulations.node_to_segment import NodeToSegment
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, gap_rows, pair
-from fastcontact.contact.projection import interpolate, nodal_normals, places, smooth_normals
+from fastcontact.contact.projection import facet_points, interpolate, nodal_normals, smooth_normals
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import quadrature
 from fastcontact.mesh.generate import box, merge_points, sphere_octant, union
@@ -40,7 +40,7 @@ def test_areas_and_normals_of_a_sphere(element):
     inner &= (mesh.points[side.points][:, [0, 2]] > 1e-9).all(axis=1)  # nodes with facets all around
     assert np.abs(normals - outward)[inner].max() < (5e-3 if quadratic else 3e-2)
     middle = np.tile([[0.25, 0.25]], (len(facet), 1))
-    assert np.abs(np.linalg.norm(interpolate(smooth, places(side, facet, middle)), axis=1) - 1).max() < 1e-14
+    assert np.abs(np.linalg.norm(interpolate(smooth, facet_points(side, facet, middle)), axis=1) - 1).max() < 1e-14
     # Solid angle of the face of a cube seen from its centre, a quarter of it: 4 pi / 6 / 4 of the sphere.
     area = 4.0 * np.pi / 6.0
     tolerance = 1e-4 if quadratic else 2e-2
@@ -67,7 +67,7 @@ def test_a_surface_may_mix_triangles_and_quadrangles(order):
         assert gap == pytest.approx(-1.0, abs=1e-14)
         assert B.sum(axis=1) == pytest.approx(-1.0, abs=1e-14)
         assert found.normal == pytest.approx(np.tile([0.0, 0, 1], (50, 1)), abs=1e-14)
-        at = places(side, found.facet, found.xi)
+        at = facet_points(side, found.facet, found.xi)
         foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
         assert foot[:, :2] == pytest.approx(positions[:, :2], abs=1e-12)
     with pytest.raises(fc.ContactError, match=r"'ZMAX' mixes facets of .*use 'continuous' or 'node_to_segment'"):
@@ -92,7 +92,7 @@ def test_projection_along_averaged_normals_is_continuous():
         path = start + np.linspace(0, 1, n + 1)[:, None] * (end - start)
         found = pair(path, side, mesh.points, 0.5, normals)
         assert found.paired.all()
-        at = places(side, found.facet, found.xi)
+        at = facet_points(side, found.facet, found.xi)
         foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
         if normals == "averaged":  # the candidate stands exactly along the normal
             arm = path - foot

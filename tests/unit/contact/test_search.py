@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fastcontact import ContactError
 from fastcontact._jit import decorators
-from fastcontact.contact.projection import closest, closest_of_kinds
+from fastcontact.contact.projection import closest, closest_of_types
 from fastcontact.contact.search.facet_tables import flat_triangles, tables, terms
 from fastcontact.mesh import elements
 
@@ -239,7 +239,7 @@ def test_turning_and_scaling_everything_changes_only_rounding(name):
 def test_several_kinds_are_one_surface():
     kinds = [scattered(name, 7, 9)[0] for name in ("tri3", "quad8", "tri6")]
     points = scattered("quad4", 8, 30)[1]
-    found = closest_of_kinds(points, kinds)
+    found = closest_of_types(points, kinds)
     alone = [closest(points, corners) for corners in kinds]
     assert found.distance == pytest.approx(np.min([one.distance for one in alone], axis=0), abs=0)
     for i, facet in enumerate(found.facet):

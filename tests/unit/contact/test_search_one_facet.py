@@ -59,7 +59,7 @@ def minima(facets, m, point):
 def test_within_the_bound_there_is_one_minimum(seed, m, bend, near):
     corners, rng = bent(m, seed, bend)
     facets, _, _ = prepared(corners)
-    if facets.convex[0] == 0.0:
+    if facets.convexity_bound[0] == 0.0:
         return
     place = grid(OF_SIZE[m], 9)[rng.integers(len(grid(OF_SIZE[m], 9)))]
     foot, direction = on(corners[0], m, place)[0], rng.normal(size=3)
@@ -67,9 +67,9 @@ def test_within_the_bound_there_is_one_minimum(seed, m, bend, near):
         # Along the normal at the foot, which then is a stationary point, as far as |(r - X) . c| stays below the bound.
         a, b, c = facets.terms[0, 1:]
         direction = np.cross(a + place[1] * c, b + place[0] * c)
-        most = facets.convex[0] / max(abs(direction @ c), 1e-300)
+        most = facets.convexity_bound[0] / max(abs(direction @ c), 1e-300)
     else:
-        most = np.sqrt(facets.convex[0]) / np.linalg.norm(direction)
+        most = np.sqrt(facets.convexity_bound[0]) / np.linalg.norm(direction)
     point = tuple(foot + near * min(most, 1e3) * direction)
     found = minima(facets, m, point)
     best = found[np.argmin(found[:, 2])]
@@ -82,7 +82,7 @@ def test_beyond_the_bound_there_may_be_two():
     """The saddle z = s t / 2: a point on its axis is nearest to two places as soon as (r - X) . c exceeds 1."""
     corners = np.array([[[-1.0, -1, 0.5], [1, -1, -0.5], [1, 1, 0.5], [-1, 1, -0.5]]])
     facets, _, _ = prepared(corners)
-    assert 0.25 < facets.convex[0] < 1.0
+    assert 0.25 < facets.convexity_bound[0] < 1.0
     below, beyond = minima(facets, 4, (0.0, 0.0, 1.8)), minima(facets, 4, (0.0, 0.0, 2.2))
     assert np.abs(below[:, :2]).max() < 1e-6
     assert len(np.unique(np.round(beyond[:, :2], 3), axis=0)) > 1
@@ -94,7 +94,7 @@ def compare_bilinear(corners, point):
     o, a, b, c = (tuple(term) for term in facets.terms[0])
     s, t, square = straight_3d_kernels.on_bilinear(tuple(np.subtract(point, o)), a, b, c, np.inf)
     rest = np.subtract(point, on(corners[0], 4, (s, t))[0])
-    if not (square >= 0.0 and abs(rest @ c) < facets.convex[0]):
+    if not (square >= 0.0 and abs(rest @ c) < facets.convexity_bound[0]):
         return False
     size = np.linalg.norm(corners[0] - corners[0].mean(axis=0), axis=1).max()
     assert rest @ rest == pytest.approx(square, rel=1e-11, abs=1e-26 * size**2)
@@ -132,7 +132,7 @@ def test_degenerate_and_strongly_warped_facets_are_right_or_refused(seed):
     for corners in (triangle, needle, folded, line, point_like, *drawn):
         compare_bilinear(corners[None], rng.uniform(-1, 2, 3))
     facets, _, _ = prepared(np.stack([line, point_like]))
-    assert facets.convex.tolist() == [0.0, 0.0]
+    assert facets.convexity_bound.tolist() == [0.0, 0.0]
 
 
 def test_a_bilinear_facet_out_of_reach_is_told_at_once():
@@ -182,4 +182,4 @@ def test_facets_are_prepared_as_they_are(seed, m, bend):
     assert np.abs(polynomial - places).max() < 1e-13
     assert (places >= low - 1e-13).all()
     assert (places <= high + 1e-13).all()
-    assert (facets.bend[0] == 0) == (m == 3 or bend == 0)
+    assert (facets.deviation[0] == 0) == (m == 3 or bend == 0)

@@ -90,11 +90,11 @@ def test_only_the_curvature_that_both_sides_share_counts():
     inner, outer = surface(rings, "CONT_INNER"), surface(rings, "CONT_OUTER")
     both = Smoothing.of(inner, outer, rings.points)
     axes = [frames(side, rings.points, rings.points) for side in (inner, outer)]
-    assert both.shared(np.array([0, 2]), np.array([1, 7]), axes) == pytest.approx(np.ones((2, 2)), rel=1e-5)
+    assert both.height_factors(np.array([0, 2]), np.array([1, 7]), axes) == pytest.approx(np.ones((2, 2)), rel=1e-5)
     twice = Smoothing(both.secondary, smooth_side(outer, 2.0 * rings.points))
-    assert twice.shared(np.array([3]), np.array([4]), axes) == pytest.approx(np.array([[0.5, 1.0]]), rel=1e-5)
+    assert twice.height_factors(np.array([3]), np.array([4]), axes) == pytest.approx(np.array([[0.5, 1.0]]), rel=1e-5)
     same = Smoothing(both.secondary, both.secondary)  # convex on convex
-    assert same.shared(np.array([3]), np.array([4]), (axes[0], axes[0])) == pytest.approx(np.zeros((1, 2)))
+    assert same.height_factors(np.array([3]), np.array([4]), (axes[0], axes[0])) == pytest.approx(np.zeros((1, 2)))
     mesh = fc.generate.sphere_on_block()
     model = made_of(mesh, "3d", STEEL)
     model.add_contact("ball", secondary="CONT_SPHERE", primary="CONT_BLOCK")

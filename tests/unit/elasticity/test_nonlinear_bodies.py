@@ -52,7 +52,7 @@ def test_tangent_and_forces_are_derivatives(kinematics: str, element: str, law: 
     model, bodies = single(element, kinematics, material, strain)
     shape, rng = model.mesh.points.shape, np.random.default_rng(1)
     size = 0.01 if strain == "small" else 0.05
-    u, along, before, step = size * rng.normal(size=shape), rng.normal(size=shape), bodies.beginning, 1e-6
+    u, along, before, step = size * rng.normal(size=shape), rng.normal(size=shape), bodies.initial_history, 1e-6
     if law.startswith("plastic"):  # which depends on the history
         before = bodies.at(size * rng.normal(size=shape), before).history
     here = bodies.at(u, before)
@@ -72,7 +72,7 @@ def test_tangent_and_forces_are_derivatives(kinematics: str, element: str, law: 
 def test_tiny_forces_have_as_many_digits(kinematics: str, element: str, law: str) -> None:
     model, bodies = single(element, kinematics, *LAWS[law])
     u = 1e-5 * np.random.default_rng(1).normal(size=model.mesh.points.shape)
-    large, tiny = (bodies.at(scale * u, bodies.beginning).force for scale in (1.0, 1e-6))
+    large, tiny = (bodies.at(scale * u, bodies.initial_history).force for scale in (1.0, 1e-6))
     assert np.abs(1e6 * tiny - large).max() <= 1e-12 * np.abs(large).max()
 
 
@@ -85,7 +85,7 @@ def test_the_tangent_begins_as_linear_stiffness(element: str, law: str) -> None:
         model, bodies = single(element, kinematics, material, strain)
         field = model.material_field()
         K = stiffness(model.mesh, kinematics, field.moduli, field.moduli_rows, None, field.treatment).toarray()
-        found = bodies.at(np.zeros_like(model.mesh.points), bodies.beginning).K.toarray()
+        found = bodies.at(np.zeros_like(model.mesh.points), bodies.initial_history).K.toarray()
         assert np.abs(found - K).max() <= 1e-11 * np.abs(K).max()
 
 
@@ -100,9 +100,9 @@ def test_forces_turn_with_the_body(element: str, law: str) -> None:
     turn[:, 0] *= np.sign(np.linalg.det(turn))
     u = 0.05 * rng.normal(size=points.shape)
     turned = (points + u) @ turn.T - points
-    plain, there = bodies.at(u, bodies.beginning), bodies.at(turned, bodies.beginning)
+    plain, there = bodies.at(u, bodies.initial_history), bodies.at(turned, bodies.initial_history)
     assert np.abs(there.force - plain.force @ turn.T).max() <= 1e-11 * np.abs(plain.force).max()
-    rigid = bodies.at(points @ turn.T - points, bodies.beginning)
+    rigid = bodies.at(points @ turn.T - points, bodies.initial_history)
     assert max(np.abs(values).max() for values in rigid.stress.values()) <= 1e-10 * 100.0
 
 
@@ -119,7 +119,7 @@ def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(parallel, "SINGLE_THREAD_WORK", 1)
         monkeypatch.setattr(parallel.decorators, "threads", lambda count=count: count)
         bodies = NonlinearBodies(mesh, "3d", strain, model.material_field())
-        here = bodies.at(u, bodies.beginning)
+        here = bodies.at(u, bodies.initial_history)
         found.append((here.K.data, here.force, here.stress["hex8"], here.history["hex8"], here.energy))
     for other in found[1:]:
         assert all(np.array_equal(one, two) for one, two in zip(found[0], other, strict=True))
@@ -149,8 +149,8 @@ def test_the_tangent_without_initial_stress_is_positive_semidefinite(kinematics:
     points = model.mesh.points
     for squeeze in (-0.15, 0.15):
         u = squeeze * points + 0.02 * np.random.default_rng(1).normal(size=points.shape)
-        definite = bodies.at(u, bodies.beginning, geometric=0)
-        whole = bodies.at(u, bodies.beginning)
+        definite = bodies.at(u, bodies.initial_history, geometric=0)
+        whole = bodies.at(u, bodies.initial_history)
         values = np.linalg.eigvalsh(definite.K.toarray())
         assert values[0] >= -1e-12 * values[-1]
         assert np.abs(definite.K.toarray() - whole.K.toarray()).max() >= 1e-3 * values[-1] * abs(squeeze)

@@ -52,7 +52,7 @@ def test_the_equations_of_the_field_are_those_of_the_points(closed):
     expected = np.linalg.lstsq(whole, np.concatenate([f, c]), rcond=None)[0]
     solver = Amg(1e-11)
     solver.prepare(K, modes)
-    among = projection.among(rows)
+    among = projection.block_operator(rows)
     assert isinstance(among, FieldCompliance)
     u, forces = solver.load(f).solve(B, c, among)
     assert not solver.columns.requests
@@ -74,7 +74,7 @@ def test_softer_points_have_the_compliance_of_both():
     expected = np.linalg.solve(whole, np.concatenate([f, c]))
     solver = Amg(1e-11)
     solver.prepare(K, modes)
-    u, forces = solver.load(f).solve(B, c, projection.among(rows).softened(softness, lambda: dense))
+    u, forces = solver.load(f).solve(B, c, projection.block_operator(rows).softened(softness, lambda: dense))
     assert not solver.columns.requests
     for found, exact in ((u, expected[: len(f)]), (forces, expected[len(f) :])):
         assert found == pytest.approx(exact, abs=1e-8 * np.abs(found).max())
@@ -82,7 +82,9 @@ def test_softer_points_have_the_compliance_of_both():
 
 def test_points_beside_equations_that_do_not_give_way():
     projection, m = along_a_line(), 27
-    both = FieldCompliance.stacked([projection.among(np.arange(4, 20)), FieldCompliance.none(2)], lambda: dense)
+    both = FieldCompliance.stacked(
+        [projection.block_operator(np.arange(4, 20)), FieldCompliance.none(2)], lambda: dense
+    )
     dense = np.zeros((18, 18))
     dense[:16, :16] = projection.block(np.arange(4, 20))
     K, modes, fixed = box()

@@ -13,7 +13,7 @@ from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination import pivot_order
-from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, block_inverse, lumped
+from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, block_inverse, lumped_matrix
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.pivot_order import choose_pivots, column_inverse, pivots_of_most_groups
 from fastcontact.linear.solvers import amg
@@ -229,7 +229,7 @@ def test_blocks_of_any_size_and_order_are_inverted_together():
 def test_lumped_entries_are_those_of_the_direction_of_each_pivot():
     P = csr_array(np.array([[2.0, 0.1, 1.0], [0.2, 3.0, 0.3], [1.0, 0.0, 2.0]]))
     pivots = np.array([0, 1, 3])  # components 0 and 1 of node 0, component 0 of node 1
-    assert lumped(P, pivots, 3).toarray() == pytest.approx(
+    assert lumped_matrix(P, pivots, 3).toarray() == pytest.approx(
         np.array([[3.0, 0.1, 0.0], [0.5, 3.0, 0.0], [0.0, 0.0, 3.0]])
     )
 
@@ -289,7 +289,7 @@ def test_standard_multipliers_over_a_whole_interface_cost_multigrid_what_dual_on
 def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_many_columns(
     options, element, monkeypatch
 ):
-    monkeypatch.setattr("fastcontact.linear.multigrid.solver.MOST_COLUMNS", 20)
+    monkeypatch.setattr("fastcontact.linear.multigrid.solver.MAX_COLUMNS", 20)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.LARGEST_BLOCK", 8)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.LARGEST_DENSE", 8)
     model = pressed(5, element, **options)
@@ -298,7 +298,7 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
     assert "dual" in solver.replacement_reason
     force = solved(model, "direct")[1].contact["c"].force
     assert step.contact["c"].force == pytest.approx(force, abs=1e-9)
-    monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})
+    monkeypatch.setattr(amg, "MAX_FACTORISED_DOFS", {3: 100})
     refused(TooManyColumnsError, "direct solver", solved, model, "amg")
 
 
@@ -314,8 +314,8 @@ def test_auto_knows_which_constraints_multigrid_cannot_eliminate():
 @pytest.mark.parametrize(("solver", "friction"), [("direct", 0.0), ("direct", 0.3), ("amg", 0.3)])
 def test_a_full_compliance_that_would_take_hours_is_refused_with_the_alternative(solver, friction, monkeypatch):
     model = pressed(5, formulation="continuous", friction=friction)
-    monkeypatch.setattr("fastcontact.linear.delassus.MOST_ROWS", 100)
-    monkeypatch.setattr("fastcontact.analysis.friction.solve.MOST_ROWS_WITH_FRICTION", 100)
+    monkeypatch.setattr("fastcontact.linear.delassus.MAX_ROWS", 100)
+    monkeypatch.setattr("fastcontact.analysis.friction.solve.MAX_ROWS_WITH_FRICTION", 100)
     expected = r"full compliance of \d+ constraints, .*GB .*formulation=\"mortar\" with multipliers=\"dual\""
     refused(fc.ContactError, expected, solved, model, solver)
 

@@ -69,12 +69,12 @@ def test_auto_chooses_by_dimension_and_size():
     assert linear.make("auto", dim=2, n_dofs=1000).name == "direct"
     assert linear.make("auto", dim=3, n_dofs=1_000_000).name == "amg"
     assert linear.make("auto", dim=3, n_dofs=40_000).name == "amg"
-    assert linear.make("auto", dim=3, n_dofs=40_000, quadratic=True).name == "direct"
-    assert linear.make("auto", dim=3, n_dofs=60_000, quadratic=True).name == "amg"
+    assert linear.make("auto", dim=3, n_dofs=40_000, has_quadratic_cells=True).name == "direct"
+    assert linear.make("auto", dim=3, n_dofs=60_000, has_quadratic_cells=True).name == "amg"
     assert linear.make("auto", dim=2, n_dofs=2_000_000).name == "direct"
     assert linear.make("auto", dim=2, n_dofs=4_000_000).name == "amg"
-    assert linear.make("auto", dim=3, n_dofs=140_000, columns=True).name == "direct"
-    assert linear.make("auto", dim=3, n_dofs=160_000, columns=True).name == "amg"
+    assert linear.make("auto", dim=3, n_dofs=140_000, needs_columns=True).name == "direct"
+    assert linear.make("auto", dim=3, n_dofs=160_000, needs_columns=True).name == "amg"
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_auto_chooses_by_dimension_and_size():
     ],
 )  # fmt: skip
 def test_auto_looks_at_what_the_contact_asks_of_a_solver(options, solver, monkeypatch):
-    monkeypatch.setattr(linear, "DIRECT_UP_TO", {2: 100, 3: 100})
+    monkeypatch.setattr(linear, "MAX_DIRECT_DOFS", {2: 100, 3: 100})
     model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain", E=1.0, LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=0.0, y=-1e-3)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)

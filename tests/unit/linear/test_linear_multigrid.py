@@ -20,7 +20,7 @@ from fastcontact.linear.krylov.iterations import ConjugateGradients
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid import matrix as matrices
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
-from fastcontact.linear.multigrid.hierarchy import Hierarchy, by_columns, graph, product
+from fastcontact.linear.multigrid.hierarchy import Hierarchy, column_pattern, galerkin_product, graph
 from fastcontact.linear.multigrid.level import CoarseLevel, chebyshev, largest_eigenvalue
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.solvers.amg import Amg
@@ -174,7 +174,7 @@ def test_a_galerkin_product_of_other_blocks():
     A.sort_indices()
     P, _ = random_blocks(2, 3, 40, 12, seed=5)
     own = matrix_of(P)
-    result = product(matrix_of(A), own, by_columns(own, 12))
+    result = galerkin_product(matrix_of(A), own, column_pattern(own, 12))
     expected = (P.T @ A @ P).toarray()
     assert np.abs(scipy_of(result).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
 
@@ -293,11 +293,11 @@ def test_springs_are_kept_and_told_apart():
     u, r, expected = rng.normal(size=9), np.zeros(9), springs.rows.toarray()
     again.subtract_forces(u, r, 2.0)
     assert r == pytest.approx(-2.0 * expected.T @ (springs.stiffness * (expected @ u)))
-    assert springs.alike(again)
-    assert not springs.alike(None)
-    assert not springs.alike(Springs(springs.rows[:3], springs.stiffness[:3]))
-    assert springs.alike(springs.scaled(1.2))
-    assert not springs.alike(springs.scaled(3.0))
+    assert springs.is_similar(again)
+    assert not springs.is_similar(None)
+    assert not springs.is_similar(Springs(springs.rows[:3], springs.stiffness[:3]))
+    assert springs.is_similar(springs.scaled(1.2))
+    assert not springs.is_similar(springs.scaled(3.0))
 
 
 def test_springs_side_by_side_may_push_along_other_rows():
@@ -344,7 +344,7 @@ def prepared(precision="single", scale=1.0, divisions=(12, 11, 10)):
 def test_coarser_levels_serve_for_a_matrix_that_differs_little():
     solver, f, fixed = prepared()
     before, (K, modes, _, _) = solver.load(f).solve(contact_rows(fixed), np.full(6, 1e-3))[0], problem((12, 11, 10))
-    hierarchy, near = solver.hierarchy, solver.near()
+    hierarchy, near = solver.hierarchy, solver.copy_for_similar_matrix()
     near.prepare(K * 1.3, modes)
     assert all(one.A is other.A for one, other in zip(near.hierarchy.levels[1:], hierarchy.levels[1:], strict=True))
     u = near.load(f).solve(contact_rows(fixed)[:0], np.empty(0))[0]
@@ -359,16 +359,16 @@ def test_a_matrix_that_differs_much_gets_its_own_hierarchy_and_so_do_all_later_o
     stiff = np.where(np.arange(len(f) // 3) % 7 < 3, 100.0, 1.0).repeat(3)
     other = bsr_array((diags_array(stiff) @ csr_array(K) @ diags_array(stiff)).tobsr((3, 3)))
     other.sort_indices()
-    snapshot, near = solver.snapshot(), solver.near()
+    snapshot, near = solver.snapshot(), solver.copy_for_similar_matrix()
     near.prepare(other.copy(), modes)
     u = near.load(f).solve(contact_rows(fixed)[:0], np.empty(0))[0]
     assert np.abs(other @ u - f).max() < 1e-8 * np.abs(f).max()
-    later = solver.near()
+    later = solver.copy_for_similar_matrix()
     later.prepare(K.copy(), modes)
     assert near.hierarchy.levels[1].A is not solver.hierarchy.levels[1].A
     assert later.hierarchy.levels[1].A is not solver.hierarchy.levels[1].A
     solver.put_back(snapshot)
-    later = solver.near()
+    later = solver.copy_for_similar_matrix()
     later.prepare(K.copy(), modes)
     assert later.hierarchy.levels[1].A is solver.hierarchy.levels[1].A
 

@@ -106,7 +106,7 @@ def test_numbers_that_somebody_else_holds_stay_where_they_are():
 def test_blocks_stored_once_multiply_as_if_all_were(size, length, monkeypatch):
     """Parts of few rows, the last one shorter, or one part."""
     monkeypatch.setattr(matrices, "MIN_ROWS", length)
-    monkeypatch.setattr(matrices, "MAX_PARTS", 40)
+    monkeypatch.setattr(matrices, "MAX_STRIPS", 40)
     K = matrix(40, size)
     A, rng = ScaledMatrix(K, "single").scaled, np.random.default_rng(7)
     dense = A.to_scipy().toarray()

@@ -12,7 +12,7 @@ from fastcontact.elasticity.constrained_system import separate_supports
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.linear import choice as linear
 from fastcontact.linear.cholesky import symmetric_factors, triangular_kernels
-from fastcontact.linear.cholesky.factorisation import fill_reducing
+from fastcontact.linear.cholesky.factorisation import fill_reducing_order
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.factor_solver import KnownLoads
 from fastcontact.linear.multigrid.local_change import SymmetricChange
@@ -88,7 +88,7 @@ def test_solutions_together_pass_over_supernodes_that_are_not_reached():
 
 def test_the_order_keeps_factors_as_small_as_superlu_does():
     K, _ = supported(10)
-    order = fill_reducing(K, np.empty(0, np.intp))
+    order = fill_reducing_order(K, np.empty(0, np.intp))
     options = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     ours = splu(csc_array(K.tocsc()[order][:, order]), permc_spec="NATURAL", **options)
     theirs = splu(K.tocsc(), permc_spec="MMD_AT_PLUS_A", **options)
@@ -102,7 +102,7 @@ def test_tangents_share_an_order_with_fewer_entries():
     K, last = bsr_array(kron(line, eye_array(n)) + kron(eye_array(n), line), blocksize=(1, 1)), np.arange(n)
     solver = linear.make("direct", dim=2, n_dofs=n * n)
     solver.prepare(K, none, last)
-    tangents = [solver.near() for _ in range(2)]
+    tangents = [solver.copy_for_similar_matrix() for _ in range(2)]
     for factor, tangent in enumerate(tangents, 2):
         tangent.prepare(factor * K, none, last)
         f = np.random.default_rng(3).normal(size=n * n)
@@ -140,7 +140,7 @@ def test_contact_takes_its_compliance_and_all_displacements_from_the_factors(nam
     K, top, solver = prepared(name)
     exact = np.linalg.inv(K.toarray())
     np.testing.assert_allclose(
-        solver.columns.of_rows(csr_array(np.eye(K.shape[0])[top])),
+        solver.columns.delassus(csr_array(np.eye(K.shape[0])[top])),
         exact[np.ix_(top, top)],
         atol=1e-13 * np.abs(exact).max(),
     )
@@ -282,9 +282,9 @@ def test_changes_on_the_finest_and_the_next_coarser_level(size, width, number):
     ours, expected = changes(size, rng)
     change, expected = ours[number], expected[number]
     largest = np.abs(expected).max()
-    assert np.abs(change.on_finest().toarray() - expected).max() < 1e-12 * largest
+    assert np.abs(change.matrix().toarray() - expected).max() < 1e-12 * largest
     P, dense = prolongator(size, width, rng)
-    coarse = change.on_coarse(P).on_nodes(np.arange(N_COARSE)).toarray()
+    coarse = change.galerkin_product(P).padded(np.arange(N_COARSE)).toarray()
     assert np.abs(coarse - dense.T @ expected @ dense).max() < 1e-12 * np.abs(coarse).max()
     diagonal = change.diagonal()
     blocks = expected.reshape(N_NODES, size, N_NODES, size)[diagonal.nodes, :, diagonal.nodes]

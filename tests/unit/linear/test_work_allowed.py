@@ -7,13 +7,13 @@ from scipy.sparse import csr_array
 from test_grouped_pivots import mass_equations
 
 from fastcontact.linear.elimination import pivot_order
-from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, condition
+from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, DependenceError, condition
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.solvers import amg
 
 
 def test_multigrid_that_costs_more_than_factors_hands_over_in_time_and_says_at_which_work(monkeypatch):
-    monkeypatch.setattr("fastcontact.linear.multigrid.solver.MOST_COLUMNS", 100_000)
+    monkeypatch.setattr("fastcontact.linear.multigrid.solver.MAX_COLUMNS", 100_000)
     # The compliance of continuous contact with friction is formed from columns, a solution each.
     model = pressed("hex20", friction=0.3, n=5, formulation="continuous", penalty=100.0)
     solver, found = solved(model, "amg")
@@ -39,7 +39,7 @@ def test_after_factors_took_over_solutions_are_as_accurate_as_theirs(monkeypatch
 def test_without_factors_that_fit_any_work_is_allowed(monkeypatch):
     monkeypatch.setattr(amg, "MAX_ITERATIONS", 0)
     monkeypatch.setattr(amg, "ITERATIONS_PER_UNKNOWN", {3: 0.0})
-    monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})
+    monkeypatch.setattr(amg, "MAX_FACTORISED_DOFS", {3: 100})
     solver, _ = solved(pressed(friction=0.3, n=6), "amg")
     assert not solver.replacement_reason
     assert solver.counters.iterations > 10
@@ -93,7 +93,7 @@ def test_forces_through_equal_rows_are_refused_though_no_pivot_is_small(parts, r
     assert np.linalg.matrix_rank(P.toarray()) == len(pivots) - 1
     with pytest.raises(CoupledError):
         CoupledPivots(P, pivots, 3)
-    with pytest.raises(RepeatedError):
+    with pytest.raises(DependenceError):
         eliminate(B, np.zeros(len(pivots)), csr_array(F), nodes, 3)
 
 

@@ -225,7 +225,7 @@ def test_every_line_of_progress_tells_that_kernels_are_compiled(capsys):
         with Progress(3, show=True):
             compiling.notify()
             compiling.notify()
-        assert capsys.readouterr().err.count(compiling.TEXT) == 1
+        assert capsys.readouterr().err.count(compiling.ANNOUNCEMENT) == 1
 
 
 def test_a_result_file_shows_a_table(model, tmp_path):

@@ -230,14 +230,14 @@ def test_whatever_meshio_does_to_its_process(tmp_path, monkeypatch, does, reason
     path.touch()
     monkeypatch.syspath_prepend(str(folder.parent))
     monkeypatch.setattr(meshio_process, "SECONDS", 1)
-    monkeypatch.setattr(meshio_process, "WAITING", 2 if "sleep" in does else 60)
+    monkeypatch.setattr(meshio_process, "ELAPSED_TO_CPU_TIME", 2 if "sleep" in does else 60)
     assert meshio_process.read_in_process(path, "vtu") == {"error": reason}
 
 
 def test_a_mesh_that_is_larger_than_its_file_can_mean(tmp_path, monkeypatch):
     path = tmp_path / "mesh.vtu"
     fc.write_mesh(path, MESH)
-    for name in ("RETURNED", "RETURNED_PER_BYTE"):
+    for name in ("ANSWER_SIZE", "ANSWER_SIZE_PER_BYTE"):
         monkeypatch.setattr(meshio_process, name, 0)
     refused(FileError, "it contains more than is plausible for a file of its size", fc.read_mesh, path)
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastcontact as fc
-from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
-from fastcontact.mesh.generate._triangulate import delaunay, edges_of, filled, stars_of
+from fastcontact.mesh.generate._spacing import Spacing, divide, progression
+from fastcontact.mesh.generate._triangulate import delaunay, edges_of, stars_of, triangulated_body
 
 size = st.floats(0.01, 1.0)
 
@@ -17,7 +17,7 @@ size = st.floats(0.01, 1.0)
 @given(length=st.floats(1.0, 50.0), first=size, last=size)
 @settings(max_examples=200, deadline=None)
 def test_a_geometric_line_keeps_the_ratio_and_the_limits_with_the_fewest_segments(length, first, last):
-    steps = length * np.diff(geometric(length, first, last))
+    steps = length * np.diff(progression(length, first, last))
     assert steps.sum() == pytest.approx(length)
     assert (steps > 0).all()
     n = len(steps)
@@ -35,7 +35,7 @@ def test_a_geometric_line_keeps_the_ratio_and_the_limits_with_the_fewest_segment
 @settings(max_examples=50, deadline=None)
 def test_segments_follow_the_size_function(near, far, plateau):
     spacing = Spacing(near, far, plateau=plateau, reach=10.0)
-    nodes = divided(lambda s: np.column_stack([10.0 * s, 0.0 * s]), 10.0, spacing)
+    nodes = divide(lambda s: np.column_stack([10.0 * s, 0.0 * s]), 10.0, spacing)
     steps = np.diff(nodes[:, 0])
     middles = 0.5 * (nodes[:-1] + nodes[1:])
     assert nodes[0].tolist() == [0.0, 0.0]
@@ -56,9 +56,9 @@ def polygon(corners, spacing):
     sides = []
     for k, (start, end) in enumerate(zip(corners, corners[1:] + corners[:1], strict=True)):
         a, b = np.array(start, float), np.array(end, float)
-        line = divided(lambda s, a=a, b=b: a + s[:, None] * (b - a), float(np.linalg.norm(b - a)), spacing)
+        line = divide(lambda s, a=a, b=b: a + s[:, None] * (b - a), float(np.linalg.norm(b - a)), spacing)
         sides.append((f"SIDE{k}", line))
-    return filled("BODY", sides, spacing)
+    return triangulated_body("BODY", sides, spacing)
 
 
 @pytest.mark.each_value
@@ -96,7 +96,7 @@ def test_triangles_cover_the_hull_and_stars_close_around_inner_points():
 
 
 def test_a_segment_as_long_as_the_line_to_rounding_makes_two():
-    assert len(geometric(1.0, 0.9999999999999999, 0.36741607936191695)) == 3
+    assert len(progression(1.0, 0.9999999999999999, 0.36741607936191695)) == 3
 
 
 TOO_LARGE = [
