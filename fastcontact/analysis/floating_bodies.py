@@ -269,7 +269,9 @@ class FloatingBodies:
 
         If bodies may slide far, `slides`, the springs are so soft that their forces are negligible.
         """
-        return SoftSprings(loaded, self._unknowns(dofs), load, (SINGLE_PRECISION if slides else SOFT) * self.stiffness)
+        stiffness = (SINGLE_PRECISION if slides else SOFT) * self.stiffness
+        modes = self._values_at_springs  # in terms of those with springs, which depend on the choice of nodes
+        return SoftSprings(loaded, self._unknowns(dofs) @ modes, modes.T @ load, stiffness)
 
     def _unknowns(self, dofs: ActiveDofs) -> Array:
         """Return the active unknowns (n, k) in the free rigid-body modes."""
@@ -282,7 +284,8 @@ class FloatingBodies:
         Its keys are ``motions``, the free motions of bodies; ``springs``, the components to which springs are
         attached; ``spring_stiffness`` [force / length]; ``force_left``, the remaining force of each spring [force];
         ``relative_to_load``, the largest of these forces divided by `load` [-]; and ``positions``, the number of positions.
-        The load step adds ``undetermined``, the result of the method of this name.
+        The load step adds ``undetermined``, the names of the motions that the method of this name returns, by body, and
+        ``moved``, the largest displacement of these bodies in the step [length].
         """
         remaining = np.abs(rigid.spring_force)
         return {
@@ -296,8 +299,8 @@ class FloatingBodies:
 
     def undetermined(
         self, constraints: Constraints, multiplier: Array, u: Array, load: float, residual: float
-    ) -> dict[str, list[str]]:
-        """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step, by body.
+    ) -> FreeMotions:
+        """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step.
 
         Any position without contact forces is then a solution. Contact forces of sides that just touch are round-off and are
         ignored. Such forces are negligible compared with the force of a spring that is elongated by the largest
@@ -324,7 +327,7 @@ class FloatingBodies:
         restraints = [constraints.B[loaded], *(tangent[frictional] for tangent in constraints.tangents)]
         _, values, V = np.linalg.svd(np.vstack([rows @ self.motions.displacement for rows in restraints]))
         free = np.append(values, np.zeros(len(V) - len(values))) <= SINGLE_PRECISION
-        return self.motions.combined(V[free].T).by_body() if free.any() else {}
+        return self.motions.combined(V[free].T)
 
     def moving(self, rigid: RigidPosition) -> list[str]:
         """Return the motions of bodies in the free rigid-body modes with the largest generalised forces of the springs."""

@@ -40,7 +40,6 @@ class FrictionIncrements:
 
     def __init__(self, step: StepContext) -> None:
         self._step, self._shear_limit = step, step.problem.friction_while_touching
-        self._near = NOTABLE if step.linearises_contact else 0.0
         self.due = self.unfinished = self._settled = False
         self._paired, self._shift = None, np.inf
 
@@ -66,7 +65,8 @@ class FrictionIncrements:
 
         `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].
         """
-        self._settled = self._shear_limit < 1.0 and solution.settled and excess <= self._near * size
+        near = NOTABLE if self._step.linearises_contact else 0.0
+        self._settled = self._shear_limit < 1.0 and solution.settled and excess <= near * size
         self._active, self._size = solution.active, size
         self.due = self._outdated(constraints, u)
         if self._paired is None:

@@ -253,10 +253,12 @@ def _with_floating_bodies(
     problem, state, lift, dofs = step.problem, step.state, step.load.lift, step.problem.dofs
     last_active, guess = active, iterate.u
 
-    def solve_at(anchor: Array, step: StepContext = step) -> Solution:
+    def solve_at(anchor: Array, loaded: Loaded = step.loaded) -> Solution:
         nonlocal last_active, guess
         shifted_lift = lift + bodies.rigid(anchor)
-        solution = _solve(step, constraints, iterate, last_active, accuracy, shifted_lift, guess)
+        solution = _solve(
+            replace(step, loaded=loaded), constraints, iterate, last_active, accuracy, shifted_lift, guess
+        )
         last_active, guess = solution.wanted, guess.copy()
         guess[dofs.active] = dofs.displacement(solution.u, shifted_lift)
         return solution
@@ -290,28 +292,31 @@ def _with_floating_bodies(
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     position_response = None if problem.solver.iterative else partial(bodies.position_response, constraints, dofs)
     springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
-    soft_iterations, round_off = 0, state.gap_round_off
+    soft_iterations, slip_so_far, round_off = 0, None, state.gap_round_off
     if position_response is not None:
         # Displacements without contact forces, which are large if bodies are flexible, cancel.
         round_off = max(round_off, SUM_ROUND_OFF * largest(step.loaded.full_solution(np.zeros(dofs.T.shape[1]))))
-    if position_response is not None and constraints.tangents:
+    in_increments = isinstance(step.path, Path)
+    if constraints.tangents and (position_response is not None or in_increments):
         # With stiff springs, a problem with friction may have several solutions, and none near the position of equilibrium.
-        last_frictional, softened = (
-            iterate.frictional,
-            bodies.with_soft_springs(step.loaded, dofs, loads[0], slides=not iterate.history),
-        )
-        softly_held = solve_at(start, replace(step, loaded=softened))
-        soft_iterations = softly_held.iterations
+        slides, last_frictional = in_increments or not iterate.history, iterate.frictional
+        softly_held = solve_at(start, bodies.with_soft_springs(step.loaded, dofs, loads[0], slides))
+        soft_iterations, slip_so_far = softly_held.iterations, softly_held.slip_so_far
         if softly_held.settled:
             start = start + softly_held.u[springs]
+        elif in_increments:
+            return softly_held, dofs.displacement(softly_held.u, lift + bodies.rigid(start))
         else:
             iterate.frictional = last_frictional
+        if in_increments:  # stiff springs are slack only at the end of the step
+            step = replace(step, path=slip_so_far)
     rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, round_off)
     if rigid.solution.settled and not rigid.slack:
         gaps = gap_changes(problem.model, bodies.motions)
         raise failure(not_restrained(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
-    solution = replace(rigid.solution, iterations=rigid.solution.iterations + soft_iterations)
+    iterations = rigid.solution.iterations + soft_iterations
+    solution = replace(rigid.solution, iterations=iterations, slip_so_far=slip_so_far)
     respond = solution.response
     if position_response is not None and respond is not None:
         solution = replace(solution, response=lambda: position_response(respond()).respond)

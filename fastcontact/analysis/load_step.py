@@ -44,6 +44,7 @@ from fastcontact.model.pretension import section_results
 from fastcontact.model.rigid_motions import generalised_forces
 from fastcontact.results.step import ContactResult, StepResult, nodal_stress_of_materials
 from fastcontact.results.units import units_of_results
+from fastcontact.round_off import SINGLE_PRECISION
 
 nodal_stress = unchecked(recovery.nodal_stress)
 von_mises, von_mises_signed = unchecked(recovery.von_mises), unchecked(recovery.von_mises_signed)
@@ -139,7 +140,9 @@ def _end_of_step(
         if settled is not None:
             forces = settled.constraints, settled.solution.multiplier
             free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force, balance.residual)
-            iterations["regularised"]["undetermined"] = free
+            moving = (np.abs(free.displacement) > SINGLE_PRECISION).any(axis=1)
+            moved = {"undetermined": free.by_body(), "moved": largest((u - start.u)[moving])}
+            iterations["regularised"] |= moved
     end = replace(end, solver=problem.solver.snapshot())
     result = recover(problem, end, contact, balance.reaction, iterations, instant, bodies)
     return end, result if heat_solution is None else heat_solution.with_heat_results(problem, result)

@@ -74,13 +74,14 @@ MIN_NODES = 10
 
 
 def result_warnings(
-    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None,
+    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]], float] | None,
     peaks: Mapping[str, Peak],
 ) -> list[str]:  # fmt: skip
     """Return the warnings about an analysis whose `last` step ended in a state.
 
-    `free` is the number of the first step in which nothing determines the position of bodies, and their free motions;
-    `peaks` are, for each pair, the number, displacements and contact results of the step with its largest normal force.
+    `free` is the number of the first step in which nothing determines the position of bodies, their free motions, and their
+    largest displacement in this step; `peaks` are, for each pair, the number, displacements and contact results of the step
+    with its largest normal force.
     """
     earlier = {peak[0]: peak for peak in peaks.values() if peak[0] != last.index}
     warnings = interpenetration(problem, last, list(earlier.values()))
@@ -283,15 +284,17 @@ def _loaded_springs(problem: Problem, last: StepResult) -> Iterator[str]:
         )
 
 
-def _undetermined_positions(last: StepResult, free: tuple[int, dict[str, list[str]]] | None) -> Iterator[str]:
+def _undetermined_positions(last: StepResult, free: tuple[int, dict[str, list[str]], float] | None) -> Iterator[str]:
     """Yield a warning about bodies whose position is undetermined in a step; for `free` see `result_warnings`."""
     if free is not None:
-        index, bodies = free
+        index, bodies, moved = free
         names = "; ".join(f"{body}: {', '.join(motions)}" for body, motions in bodies.items())
         when = "" if index == last.index else f" in load step {index}"
+        lost = f". They lost contact in this step, moving by up to {moved:.3g}: smaller load steps may avoid this"
+        lost = lost if index > 1 else ""  # contact determined all positions in earlier steps
         yield (
             f"nothing determines the position of bodies{when}, since no contact force acts against their motion ({names}): "
-            "any position without such a force is a solution; hold them by supports or weak springs, or load them"
+            f"any position without such a force is a solution; hold them by supports or weak springs, or load them{lost}"
         )
 
 
@@ -595,9 +598,10 @@ def _neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Ite
     worst = int(np.argmax(ratio))
     if ratio[worst] > NEGLECTED:
         name = body_name(mesh, bodies(mesh)[1], worst)
+        share = f"{ratio[worst]:.0%} of their work on" if ratio[worst] <= 1.0 else "more work than on"
         yield (
             f"rotations of up to {angle:.2g} rad matter in body {name}: on the strains that linear kinematics neglect its "
-            f"stresses would do {ratio[worst]:.0%} of their work on strains. Solve the model with strain='finite'"
+            f"stresses would do {share} strains. Solve the model with strain='finite'"
         )
         return
     capacity = _frictional_capacity(problem, last)

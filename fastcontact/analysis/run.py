@@ -191,15 +191,16 @@ def _solved_steps(
     touched = frozenset(name for name, (_, _, contact) in peaks.items() if contact[name].active.any())
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, last_index = problem.ramp.table[0][0], 0
-    # The first step in which the positions of bodies are undetermined, and their names.
-    undetermined: tuple[int, dict[str, list[str]]] | None = None
+    # The first step in which the positions of bodies are undetermined, their motions, and by how much they moved.
+    undetermined: tuple[int, dict[str, list[str]], float] | None = None
     if last is not None:
         begin, last_index, last = last.load_factor, last.index, None  # to free the memory of the step
     for index, instant in enumerate(instants, start=last_index + 1):
         problem, state = next_stage(prepare_model, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
-        undetermined = undetermined or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
-        undetermined = undetermined if undetermined[1] else None
+        report = step.iterations.get("regularised", {})
+        if undetermined is None and report.get("undetermined"):
+            undetermined = index, report["undetermined"], report["moved"]
         peaks = _peaks([step], peaks)
         warnings = result_warnings(problem, state, step, undetermined, peaks) if instant == instants[-1] else []
         for text in warnings:

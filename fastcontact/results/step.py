@@ -428,8 +428,8 @@ class StepResult(NameSuggestions):
 
         - ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``: numbers of iterations.
         - ``history``: list of dicts with the iterations.
-        - ``regularised``, with floating bodies: their soft springs, the forces in these springs, and the rigid-body motions
-          whose amplitude is undetermined.
+        - ``regularised``, with floating bodies: their soft springs, the forces in these springs, the rigid-body motions
+          whose amplitude is undetermined, and by how much bodies with such motions moved in the step [length].
         - ``scatter``, if round-off prevents the contact geometry from meeting the criterion: relative variation of
           ``displacement`` and of the contact ``force`` [-].
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``, ``spin_factors``: multipliers of the

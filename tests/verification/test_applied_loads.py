@@ -274,8 +274,8 @@ def test_what_was_regularised_is_kept_in_result_files(tmp_path):
         last = fc.solve(model, 1, on_step=out.write)[-1]
     kept = fc.open_results(tmp_path / "forced.vtkhdf")[-1].iterations["regularised"]
     assert kept == last.iterations["regularised"]
-    named = {"motions", "springs", "spring_stiffness", "force_left", "relative_to_load", "positions", "undetermined"}
-    assert set(kept) == named
+    named = {"motions", "springs", "spring_stiffness", "force_left", "relative_to_load", "positions"}
+    assert set(kept) == {*named, "undetermined", "moved"}
 
 
 @pytest.mark.filterwarnings("ignore:the loads strain the model by about 3e-15")
@@ -333,6 +333,19 @@ def test_an_undetermined_position_in_an_earlier_step_is_told_at_the_end():
     assert steps[-1].iterations["regularised"]["undetermined"] == {}
     assert sum("nothing determines" in str(one.message) for one in told) == 1
     assert sum("nothing determines" in text for text in steps[-1].warnings) == 1
+    assert not any("smaller load steps" in text for text in steps[-1].warnings)
+
+
+def test_a_body_that_loses_contact_in_a_step_is_told_with_its_motion():
+    ramp = fc.Ramp((1.0, 2.0), ((0.0, 0.0), (1.0, 1.0), (2.0, 0.0)))
+    with pytest.warns(fc.FastcontactWarning, match="nothing determines"):
+        held, free = fc.solve(floating_block(0.3, None), ramp)
+    points = fc.generate.block_on_block().points_of("UPPER")
+    moved = np.abs(free.displacement - held.displacement)[points].max()
+    assert moved > 1e-3
+    assert any(
+        f"They lost contact in this step, moving by up to {moved:.3g}: smaller" in text for text in free.warnings
+    )
 
 
 def floating_block(push, friction):

@@ -447,3 +447,26 @@ def test_a_block_that_is_hot_at_first_shrinks_towards_its_middle(instants, strai
     right = contact.coordinates[:, 0] > 0.05
     assert not contact.sticking[contact.active].all()
     assert contact.force_vectors[right, 0].sum() > 0.19 * contact.force_vectors[right, 1].sum()
+
+
+def test_a_ring_that_contact_alone_holds_slides_as_on_weak_springs():
+    """A ring is pulled onto a rigid pin with a clearance, and may turn about the point at which it is guided."""
+    half = fc.generate.block((1.0, 1.0), (5, 24), "quad8", name="RING")
+    half = fc.generate.renamed(half, {"LEFT": "HOLE", "RIGHT": "RIM", "BOTTOM": None, "TOP": None})
+    radius, angle = 10.0 + 20.0 * half.points[:, 0], np.pi * half.points[:, 1]
+    half = half.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+    mesh = fc.generate.merge_points(fc.generate.union(half, fc.generate.mirrored(half, "y")), 1e-6)
+    mesh = mesh.with_groups(points={"END": [int(np.argmax(mesh.points[:, 0]))]})
+    work = []
+    for steps, stiffness in ((1, 0.0), (4, 0.0), (8, 1e-3)):
+        model = elastic_model(mesh, "plane_strain", E=2e5, END="y")
+        model.add_obstacle("pin", secondary="HOLE", obstacle=fc.obstacles.Sphere((0.0, 0.0), 9.97), friction=0.2)
+        model.add_traction("RIM", x=40.0)
+        if stiffness:
+            model.add_spring("RING", x=stiffness, y=stiffness)
+        last = fc.solve(model, steps, criteria=fc.Criteria(friction_while_touching=0.01))[-1]
+        x, force = last.contact["pin"].coordinates.T, last.contact["pin"].force_vectors.T
+        moment, pull = x[0] @ force[1] - x[1] @ force[0], abs(force[0].sum())
+        assert max(abs(moment) / 10.0, abs(force[1].sum())) < 1e-6 * pull
+        work.append(last.work["friction_work"])
+    np.testing.assert_allclose(work, work[2], rtol=3e-3)
