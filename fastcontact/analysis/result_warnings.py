@@ -675,6 +675,8 @@ def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = Fals
             rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
             # The neglected strain is half the product of the transposed rotation, which is antisymmetric, with the rotation.
             neglected_work = -0.5 * np.einsum("cqij,cqij->cq", tensor, rotation @ rotation)
+            size, rotated = (np.linalg.norm(part, axis=(2, 3)) for part in (slope - rotation, rotation))
+            neglected_work[size < SINGLE_PRECISION * rotated] = 0.0  # stresses of a rigid-body motion are round-off
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
             np.add.at(work_by_body, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
     return neglected, work_by_body
