@@ -229,8 +229,8 @@ def _add_constants(material: Material, law: Any, axes: Any, **constants: Any) ->
                 f"{material.prefix}expansion and conductivity along axes are supported in linear elastic materials only"
             )
         G = law.E / (2.0 * (1.0 + law.nu))
-        others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
-        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **others)
+        optional = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
+        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **optional)
     return replace(law, **constants)
 
 
