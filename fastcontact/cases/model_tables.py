@@ -153,8 +153,8 @@ def _keys(*functions: Callable[..., None], **extra: Any) -> tuple[dict[str, Any]
 def keys_of_list(kind: str) -> tuple[dict[str, Any], Sequence[str]]:
     """Return the TOML types of the keys of the tables of a kind, one of `LISTS`, and their required keys."""
     if kind == "material":  # its required keys depend on the law
-        others = {"groups": (list, str), "law": str, "D": list, "hardening": list}
-        return _material_keys() | others | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)), ()
+        further = {"groups": (list, str), "law": str, "D": list, "hardening": list}
+        return _material_keys() | further | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)), ()
     if kind == "temperature":  # it needs either a value or a file
         return _keys(Model.add_temperature, Model.add_temperature_file)[0], ()
     extra: dict[str, Any] = {"coupling": {"place": list}, "support": {"rotation": dict}}

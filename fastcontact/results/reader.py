@@ -395,8 +395,8 @@ class Results(StepSequence):
     @property
     def cell_field_names(self) -> list[str]:
         """Names of the cell fields that the file contains for each step."""
-        others = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
-        return [name for name in self._file["VTKHDF/CellData"] if name not in others]
+        constant = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
+        return [name for name in self._file["VTKHDF/CellData"] if name not in constant]
 
     def _read_cell_fields(self, number: int) -> dict[str, Array]:
         data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])

@@ -27,9 +27,9 @@ def substitute(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, 
     linked = data.get("study", {}).get("parameters", {})
     for parameter, value in values.items():
         if parameter not in linked:
-            _set(case, parameter, value, [*linked, *case])
+            _set_value(case, parameter, value, [*linked, *case])
         for path, law in linked.get(parameter, {}).items():
-            _set(case, path, law_value(law, value, f"study.parameters.{parameter}.'{path}'"), case)
+            _set_value(case, path, law_value(law, value, f"study.parameters.{parameter}.'{path}'"), case)
     return case
 
 
@@ -48,7 +48,7 @@ def law_value(law: Any, value: Any, where: str) -> Any:
         raise CaseError(f"{where} = '{law}' is too large a number for {value!r}") from None
 
 
-def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> None:
+def _set_value(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> None:
     """Set the value at a path of a parsed case file; messages about unknown paths suggest one of `names`."""
     keys, kinds = _keys(path), [kind for kind in ("contact", "obstacle") if isinstance(data.get(kind), dict)]
     pairs = [f"{kind}.{name}" for kind in kinds for name in data[kind]]

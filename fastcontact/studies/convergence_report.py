@@ -27,12 +27,12 @@ MAIN = ("pressure_max", "force")
 def sentences(series: Series) -> list[str]:
     """Return sentences on the mesh errors and the differences from theory of a combination of element and formulation."""
     if not series.limits:
-        return [f"{series.combination}: {_without_limits(series)}."]
+        return [f"{series.combination}: {_missing_limits(series)}."]
     names = [name for name in series.shown(MAIN) if name in series.limits]
     return [*(text for name in names for text in _quantity_sentences(series, name)), *_equal_force_sentences(series)]
 
 
-def _without_limits(series: Series) -> str:
+def _missing_limits(series: Series) -> str:
     return f"{len(series.levels)} levels were solved, and an extrapolated limit needs three"
 
 
@@ -447,7 +447,7 @@ class Study(Report):
         remarks = []
         for series in self.series:
             remarks += self.warnings_of((f"level {level.number}", level.warnings) for level in series.levels)
-            remarks += [] if series.limits else [f"no limits: {_without_limits(series)}"]
+            remarks += [] if series.limits else [f"no limits: {_missing_limits(series)}"]
             remarks += [f"level {number} failed: {text}" for number, text in series.failed.items()]
         return remarks + [f"{name} failed: {text}" for name, text in self.failed.items()]
 

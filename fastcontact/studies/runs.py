@@ -399,8 +399,8 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
 
     There are none if the values of this parameter are not numbers or are all equal.
     """
-    first, varied = abscissa_of(parameters)
-    values, others = parameters[first], {name: parameters[name] for name in parameters if name != first}
+    abscissa, varied = abscissa_of(parameters)
+    values, others = parameters[abscissa], {name: parameters[name] for name in parameters if name != abscissa}
     numbers = [float(value) for value in values if not isinstance(value, (str, bool))]
     if len(numbers) < len(values) or min(numbers) == max(numbers):
         return ()
@@ -408,7 +408,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
     x = np.geomspace(low, high, CURVE_POINTS) if low > 0 else np.linspace(low, high, CURVE_POINTS)
     data, curves = data_of(case), []
     for choice in (dict(zip(others, values, strict=True)) for values in itertools.product(*others.values())):
-        rows = [_theory_at(substitute(data, {first: float(value), **choice}), pair) for value in x]
+        rows = [_theory_at(substitute(data, {abscissa: float(value), **choice}), pair) for value in x]
         names = [name for name in rows[0] if all(name in row for row in rows)]
         theory = {name: np.array([row[name] for row in rows]) for name in names}
         curves.append(TheoryCurve(label_of(choice, varied), x, theory))

@@ -73,18 +73,21 @@ def abscissa_of(parameters: Mapping[str, Sequence[Value]]) -> tuple[str, list[st
 
 
 class Drawing:
-    """Plots of a sweep over one parameter, with a curve for each choice of the others, see `abscissa_of`."""
+    """Plots of a sweep over one parameter, the `abscissa`, with a curve for each choice of the `curve_parameters`.
+
+    `abscissa_of` defines both. `scale` is that of the x axis, as in `format_axes`.
+    """
 
     def __init__(self, sweep: Sweep) -> None:
-        self.first, self.others = abscissa_of(sweep.parameters)
+        self.abscissa, self.curve_parameters = abscissa_of(sweep.parameters)
         self.sweep, self.theory = sweep, f"theory {sweep.compared}".strip()
-        values = sweep.parameters[self.first]
+        values = sweep.parameters[self.abscissa]
         numbers = [float(v) for v in values if not isinstance(v, (str, bool))]
         wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= WIDE * min(numbers)
         self.scale = "plain log" if wide else "linear"
         self.points_of: dict[str, list[Point]] = {}  # points of each curve, by its label
         for point in sweep.points:
-            self.points_of.setdefault(label_of(point.parameters, self.others), []).append(point)
+            self.points_of.setdefault(label_of(point.parameters, self.curve_parameters), []).append(point)
 
     def draw_values(self, ax: Any, quantity: str) -> None:
         """Draw a quantity and its theory over the parameter; both axes are logarithmic if all values are positive."""
@@ -92,7 +95,7 @@ class Drawing:
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(self._x(points), y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
             name = (self.theory + self._constant_note(quantity)) if k == 0 else None
-            style = {"label": name, "color": f"C{k}" if self.others else "black"}
+            style = {"label": name, "color": f"C{k}" if self.curve_parameters else "black"}
             curves = (curve for curve in self.sweep.theories if curve.label == label and quantity in curve.values)
             exact = [point.theory.get(quantity, math.nan) for point in points]
             if (curve := next(curves, None)) is not None:
@@ -105,7 +108,7 @@ class Drawing:
 
     def _x(self, points: Sequence[Point]) -> list[Any]:
         """Return the values of the parameter on the x axis, as strings if one of them is a string."""
-        x = [point.parameters[self.first] for point in points]
+        x = [point.parameters[self.abscissa] for point in points]
         return list(map(str, x)) if any(isinstance(value, str) for value in x) else x
 
     def _constant_note(self, quantity: str) -> str:
@@ -113,7 +116,7 @@ class Drawing:
         curves = self.points_of.values()
         values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
         constant = all(len(entries) == 1 for entries in values) and any(len(points) > 1 for points in curves)
-        return f"\n(the same for every {self.first})" if constant else ""
+        return f"\n(the same for every {self.abscissa})" if constant else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
         """Draw the ratios of a quantity to theory, at equal approach and at equal force, over the parameter."""
@@ -124,7 +127,7 @@ class Drawing:
                 ratios = [point.ratio(quantity, comparison) for point in points]
                 if np.isfinite(ratios).any() and (comparison, quantity) != ("equal_force", "force"):
                     name = f"to {name}" + (f"\n{label}" if label else "")
-                    color = f"C{k if self.others else n_lines}"
+                    color = f"C{k if self.curve_parameters else n_lines}"
                     ax.plot(self._x(points), ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
                     n_lines += 1
         if not n_lines:
@@ -134,15 +137,15 @@ class Drawing:
 
     def _format(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
         """Set scales, title, labels and legend; the legend is beside the axes if there are several curves."""
-        labels = parameter_label(self.first, self.sweep.units), y_label
+        labels = parameter_label(self.abscissa, self.sweep.units), y_label
         format_axes(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
-        if self.others:
+        if self.curve_parameters:
             ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def label_of(parameters: Mapping[str, Value], others: Sequence[str] | None = None) -> str:
-    """Return a label with the values of the parameters in `others`, by default of all parameters."""
-    values = ((name, parameters[name]) for name in (parameters if others is None else others))
+def label_of(parameters: Mapping[str, Value], names: Sequence[str] | None = None) -> str:
+    """Return a label with the values of the parameters in `names`, by default of all parameters."""
+    values = ((name, parameters[name]) for name in (parameters if names is None else names))
     return ", ".join(f"{name} = {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in values)
 
 
@@ -256,9 +259,9 @@ class Sweep(Report):
         """
         names, drawing = self._main_quantities(), Drawing(self)
         with_theory = any(name in point.theory for point in self.points for name in names)
-        legend_width = 1.7 * (1 + with_theory) * bool(drawing.others)  # [inch]
+        legend_width = 1.7 * (1 + with_theory) * bool(drawing.curve_parameters)  # [inch]
         size = ((8.8 if with_theory else 5.2) + legend_width, 0.5 + 3.1 * len(names))
-        varied = (drawing.first, *drawing.others)
+        varied = (drawing.abscissa, *drawing.curve_parameters)
         fixed = {name: values[0] for name, values in self.parameters.items() if name not in varied}
         heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # for a function both may be its name
         heading += f"\n{label_of(fixed)}" if fixed else ""

@@ -256,12 +256,12 @@ def _contents(path: Path, source: Source) -> bytes:
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
     """Yield the blocks of a file and of its included files. Raises CaseError if data precede the first keyword."""
     source.open_files.append(path.resolve())
-    first, *others = _KEYWORD_LINE.split(_contents(path, source))
+    preamble, *blocks = _KEYWORD_LINE.split(_contents(path, source))
     start = Location(name, 1, "")
-    _check_lengths(start, first)
-    _check_empty(Lines(start, first))
-    number = 1 + first.count(b"\n")
-    for contents in others:
+    _check_lengths(start, preamble)
+    _check_empty(Lines(start, preamble))
+    number = 1 + preamble.count(b"\n")
+    for contents in blocks:
         block = _block(name, number, contents)
         if block.keyword == "INCLUDE":
             yield from _included_blocks(block, source)

@@ -19,7 +19,7 @@ from fastcontact.cases.decks.constraints import add_rotation_points, relations_o
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
 from fastcontact.cases.decks.gaps import GAP_TOLERANCE, add_gap_facets, add_gaps, check_discrete
-from fastcontact.cases.decks.histories import ByShape, Period
+from fastcontact.cases.decks.histories import Period, ShapeGroups
 from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import check_nodes, deck_mesh_of, group_of_surface
@@ -188,10 +188,10 @@ class Building:
         Supports that do not act in all steps share a constraint if they have the same period and history. A support that
         locks a pretension section is left to `add_sections`.
         """
-        by_shape, local_supports = ByShape[int](), []
+        by_shape, local_supports = ShapeGroups[int](), []
         ends = {e.points[1] for e in self.assembly.discrete if e.cell.type == "GAPUNI"}
         free_ends = ends - self.assembly.solid_points if ends else ends
-        for table, period, components in conditions.supports.in_periods():
+        for table, period, components in conditions.supports.tables_by_period():
             remaining = [c for c in components if not (period.fixed and c[1] == 0 and c[0] in self.sections)]
             if remaining and not period.permanent:
                 self.local_supports.append(self._temporary_support(conditions, table, period, remaining))

@@ -215,7 +215,7 @@ class Histories(Generic[Key]):
         table, end = self.tracks[key].table, float(len(self.content.steps))
         return table if table[-1][0] >= end else (*table, (end, table[-1][1]))
 
-    def distinct(self) -> Iterator[tuple[Table, list[Key]]]:
+    def distinct_tables(self) -> Iterator[tuple[Table, list[Key]]]:
         """Yield each distinct history with the keys that share it."""
         members: dict[bytes, list[Key]] = {}
         for key, track in self.tracks.items():
@@ -223,9 +223,9 @@ class Histories(Generic[Key]):
         for keys in members.values():
             yield self.table(keys[0]), keys
 
-    def in_periods(self) -> Iterator[tuple[Table, Period, list[Key]]]:
+    def tables_by_period(self) -> Iterator[tuple[Table, Period, list[Key]]]:
         """Yield each distinct history with each period in which it acts, and the keys that share both."""
-        for table, keys in self.distinct():
+        for table, keys in self.distinct_tables():
             members: dict[Period, list[Key]] = {}
             for key in keys:
                 for period in self.tracks[key].periods:
@@ -233,7 +233,7 @@ class Histories(Generic[Key]):
             yield from ((table, period, group) for period, group in members.items() if period.begins < period.ends)
 
 
-class ByShape(Generic[Key]):
+class ShapeGroups(Generic[Key]):
     """Histories of nodes, facets or cells, grouped by a key, such as an axis, and by shape, so that few loads are needed.
 
     Iteration yields the key, the numbers of the members, the value and the history of each group. The value is 1 if all
@@ -252,9 +252,9 @@ class ByShape(Generic[Key]):
         members.extend(numbers)
 
     @staticmethod
-    def of(histories: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
+    def of(histories: Iterable[tuple[Table, Sequence[int]]]) -> ShapeGroups[int]:
         """Return the histories of scalar quantities, whose key is 0."""
-        by_shape = ByShape[int]()
+        by_shape = ShapeGroups[int]()
         for table, numbers in histories:
             by_shape.add(0, table, numbers)
         return by_shape

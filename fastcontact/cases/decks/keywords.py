@@ -182,7 +182,7 @@ REFUSED = {name: reason for reason, names in _REASONS.items() for name in names.
 _STANDARD_SPELLING = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFUSED)}
 
 
-def with_standard_blanks(block: Block) -> Block:
+def standard_spelling(block: Block) -> Block:
     """Return a block with the usual blanks in its keyword and parameters, which CalculiX also accepts without blanks."""
     keyword = _STANDARD_SPELLING.get(block.keyword.replace(" ", ""), block.keyword)
     entry = TRANSLATED.get(keyword)
@@ -272,7 +272,7 @@ def read_content(blocks: Iterable[Block]) -> Content:
     """Return the content of a deck from its blocks. Raises CaseError with file, line and keyword if a block is invalid."""
     reader = Reader()
     for block in blocks:
-        reader.read_block(with_standard_blanks(block))
+        reader.read_block(standard_spelling(block))
     if reader.step is not None:
         raise reader.step.error("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:

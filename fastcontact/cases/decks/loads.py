@@ -16,7 +16,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Element, Face, Target
 from fastcontact.cases.decks.blocks import key_of
 from fastcontact.cases.decks.conditions import Conditions
-from fastcontact.cases.decks.histories import ByShape, Histories, Period
+from fastcontact.cases.decks.histories import Histories, Period, ShapeGroups
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
@@ -38,8 +38,8 @@ def point_group(model: Model, deck_mesh: DeckMesh, kind: str, points: Iterable[i
 
 def add_forces(model: Model, deck_mesh: DeckMesh, conditions: Conditions, thickness: float) -> None:
     """Add the nodal forces; those along local axes are resolved into their global components."""
-    by_shape = ByShape[int]()
-    for table, components in conditions.forces.distinct():
+    by_shape = ShapeGroups[int]()
+    for table, components in conditions.forces.distinct_tables():
         by_cosine: dict[tuple[int, float], list[int]] = {}
         for point, axis, local in components:
             direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
@@ -55,8 +55,8 @@ def add_forces(model: Model, deck_mesh: DeckMesh, conditions: Conditions, thickn
 
 def distributed_loads(deck_mesh: DeckMesh, histories: Histories[Target]) -> list[Adder]:
     """Return functions that add pressures, forces per volume, heat fluxes and heat sources."""
-    by_shape = ByShape[tuple[str, str, tuple[float, ...], str]]()
-    for table, loads in histories.distinct():
+    by_shape = ShapeGroups[tuple[str, str, tuple[float, ...], str]]()
+    for table, loads in histories.distinct_tables():
         for load in loads:
             for cell, factor, rows in _cells_of(deck_mesh, load):
                 scaled = tuple((time, factor * value) for time, value in table)
@@ -132,7 +132,7 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
     Histories that differ only by a factor share a field. If the histories have corners at fewer times than there are such
     fields, one field for each of these times is added instead.
     """
-    fields = list(ByShape.of((_relative(table, table[0][1]), points) for table, points in histories.distinct()))
+    fields = list(ShapeGroups.of((_rise(table, table[0][1]), points) for table, points in histories.distinct_tables()))
     times = sorted({time for *_, table in fields for time, _ in table})
     at_times = np.zeros((len(times), model.mesh.n_points))
     for _, points, values, table in fields:
@@ -142,12 +142,12 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
         elif any(factor for _, factor in table):
             field = np.zeros(model.mesh.n_points)
             field[points] = change
-            model.add_temperature(_on_both_sides(model, field), reference=0.0, ramp=table)
+            model.add_temperature(_copy_to_opposite_sides(model, field), reference=0.0, ramp=table)
     if len(fields) > len(times):
-        model.add_temperature(_on_both_sides(model, at_times), reference=0.0, times=times)
+        model.add_temperature(_copy_to_opposite_sides(model, at_times), reference=0.0, times=times)
 
 
-def _on_both_sides(model: Model, values: Array) -> Array:
+def _copy_to_opposite_sides(model: Model, values: Array) -> Array:
     """Return nodal values (..., n_points), copied to the opposite sides of pretension sections, which the deck lacks."""
     for section in model.pretensions:
         values[..., section.opposite] = values[..., section.nodes]
@@ -162,25 +162,25 @@ def heat_loads(deck_mesh: DeckMesh, conditions: Conditions, thickness: float) ->
     adders: list[Adder] = []
     reference, steps = conditions.reference, deck_mesh.content.steps
     begin = next((number for number, step in enumerate(steps) if step.heat), 0)
-    rises = ByShape[tuple[float, float]]()
-    for table, period, points in conditions.fixed_temperatures.in_periods():
+    rises = ShapeGroups[tuple[float, float]]()
+    for table, period, points in conditions.fixed_temperatures.tables_by_period():
         if period.ends > begin:
-            rises.add(_span(period, begin), _relative(table, reference), points)
+            rises.add(_span(period, begin), _rise(table, reference), points)
     for (begins, ends), nodes, value, table in rises:
         group = deck_mesh.add_points(f"temperature {len(adders)}", nodes)
         fix = partial(Model.fix_temperature, begins=begins, ends=ends)
         adders.append(partial(fix, group=group, value=_absolute_temperature(value, reference), ramp=table))
-    for _, nodes, value, table in ByShape.of(conditions.powers.distinct()):
+    for _, nodes, value, table in ShapeGroups.of(conditions.powers.distinct_tables()):
         group = deck_mesh.add_points(f"heat {len(adders)}", nodes)
         powers = tuple((time, power / thickness) for time, power in table)
         adders.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
     faces_by_film: dict[tuple[Table, float, tuple[float, float]], list[Face | None]] = {}
-    for table, period, films in conditions.films.in_periods():
+    for table, period, films in conditions.films.tables_by_period():
         for film in films if period.ends > begin else ():
             faces_by_film.setdefault((table, film.numbers[0], _span(period, begin)), []).append(film.face)
     for (table, coefficient, (begins, ends)), faces in faces_by_film.items():
         group = deck_mesh.add_facets(f"film {len(adders)}", filter(None, faces))
-        rise = _relative(table, reference)
+        rise = _rise(table, reference)
         peak = max((value for _, value in rise), key=abs)
         ramp = tuple((time, value / peak) for time, value in rise) if peak else None
         add = partial(Model.add_film, begins=begins, ends=ends)
@@ -188,7 +188,7 @@ def heat_loads(deck_mesh: DeckMesh, conditions: Conditions, thickness: float) ->
     return adders
 
 
-def _relative(table: Table, reference: float) -> Table:
+def _rise(table: Table, reference: float) -> Table:
     """Return a history minus a reference value."""
     return tuple((time, value - reference) for time, value in table)
 

@@ -40,7 +40,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
         names = ", ".join(CONSTANTS)
         raise block.error(f"{current.prefix}TYPE={kind[:40]} is not supported; expected one of {names}")
     if kinds[0] != "ISOTROPIC":
-        _anisotropic(current, block, kinds[0])
+        _read_anisotropic(current, block, kinds[0])
         return
     row = block.only_row("temperatures" if len(block.rows) > 1 else "")
     E, nu = row.number(0), row.number(1, 0.0)
@@ -51,7 +51,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
     current.law = lambda axes: law
 
 
-def _anisotropic(current: Material, block: Block, kind: str) -> None:
+def _read_anisotropic(current: Material, block: Block, kind: str) -> None:
     """Read the constants of an anisotropic material, which may fill several lines and be followed by a temperature."""
     numbers, count = block.numbers(), CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
@@ -138,11 +138,11 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     if not D1:
         content.note(block, f"D1 = 0: the bulk modulus is that of nu = {nu}")
     with errors_at(block, current.prefix):
-        law = _hyperelastic(kind, constants, mu, bulk)
+        law = _hyperelastic_law(kind, constants, mu, bulk)
     current.law = lambda axes: law
 
 
-def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
+def _hyperelastic_law(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
     """Return a hyperelastic material from its deviatoric constants, and its shear and bulk moduli at small strains."""
     if kind == "NEO HOOKE":
         E, nu = 9.0 * bulk * mu / (3.0 * bulk + mu), (3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu))
@@ -229,8 +229,8 @@ def _add_constants(material: Material, law: Any, axes: Any, **constants: Any) ->
                 f"{material.prefix}expansion and conductivity along axes are supported in linear elastic materials only"
             )
         G = law.E / (2.0 * (1.0 + law.nu))
-        others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
-        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **others)
+        optional = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
+        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **optional)
     return replace(law, **constants)
 
 
