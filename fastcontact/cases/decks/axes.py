@@ -112,13 +112,14 @@ def local_axes(axes: Axes, point: Array) -> Array:
     """Return the local axes (3, 3) [-], in rows, at a point. Raises CaseError if they are not defined there."""
     a, b = np.reshape(axes.points, (2, 3))
     if axes.cylindrical:  # the first axis is radial, the third one along the axis of the cylinder
-        third, first = b - a, point - a
-        third = third / max(np.linalg.norm(third), TINY)
-        first = first - (first @ third) * third
+        first, third = point - a, b - a
+        first = first - (first @ third) / max(third @ third, TINY) * third
+        scales = np.linalg.norm(a) + np.linalg.norm(point), np.linalg.norm(a) + np.linalg.norm(b)
     else:
         first, third = a, np.cross(a, b)
+        scales = np.linalg.norm(a), np.linalg.norm(a) * np.linalg.norm(b)
     lengths = np.linalg.norm(first), np.linalg.norm(third)
-    if min(lengths) <= LENGTH_ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
+    if any(length <= LENGTH_ROUND_OFF * scale for length, scale in zip(lengths, scales, strict=True)):
         raise axes.error(f"the local axes are not defined at the point {point.tolist()}")
     first, third = first / lengths[0], third / lengths[1]
     return np.array([first, np.cross(third, first), third])

@@ -108,7 +108,7 @@ def contact_map(
         relative_height = _set_limits(ax, flat, _loaded_nodes(contact, blocks) & (not everything))
         bar = {"location": "bottom", "shrink": 0.6} if relative_height == FLAT else {"shrink": 0.75 * relative_height}
         ax.figure.colorbar(artist, ax=ax, label=axis_label(caption, units, quantity), **bar)
-        _mark_nodes(ax, flat, contact, two_maps)
+        _mark_nodes(ax, flat, contact, distinguish=two_maps and bool(contact.shear.any()))
         x_label, y_label = (axis_label(label, units, "length") for label in labels)
         ax.set(xlabel=x_label, ylabel=y_label, aspect="equal")
         ax.set_title(f"{caption}\nlargest {value_text(values.max(initial=0.0), units, quantity)}", fontsize="medium")

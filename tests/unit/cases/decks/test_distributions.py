@@ -7,6 +7,9 @@ from models import made_of
 from refusals import refused
 
 import fastcontact as fc
+from fastcontact.cases.decks.axes import local_axes
+from fastcontact.cases.decks.blocks import Location
+from fastcontact.cases.decks.content import Axes
 
 CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 NODES = "*Node\n" + "".join(
@@ -208,3 +211,13 @@ def test_sides_that_are_apart_are_refused(tmp_path):
 def test_damage_of_a_material_is_none_of_a_layer(tmp_path):
     text = WHOLE.replace("200000., 0.\n", "200000., 0.\n*Damage Initiation, criterion=QUADS\n1., 2., 2.\n")
     refused(fc.CaseError, "material 'steel': damage is supported for cohesive layers only", deck_of, tmp_path, text)
+
+
+@pytest.mark.parametrize("cylindrical", [False, True])
+@pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
+def test_local_axes_do_not_depend_on_the_distance_of_their_points(length, cylindrical):
+    points = (0.0, 0.0, 0.0, 0.0, 0.0, length) if cylindrical else (0.0, length, 0.0, -length, 0.0, 0.0)
+    axes = Axes(Location("", 1, "ORIENTATION"), "turned", cylindrical, points)
+    np.testing.assert_allclose(
+        local_axes(axes, np.array([0.0, length, length])), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], atol=1e-12
+    )
