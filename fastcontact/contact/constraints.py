@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.sparse import csr_array, diags_array, vstack
+from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.overclosure import OverclosureLaw
@@ -33,6 +33,13 @@ class Compliance(Protocol):
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C @ multiplier`` [length] for multipliers (m,) or vectors of forces (m, dim) [force]."""
+
+
+class MultiplierCompliance(Compliance, Protocol):
+    """A compliance that is diagonal except for a small rank."""
+
+    def split(self, rows: Indices) -> tuple[Array, csr_array, Array]:
+        """Return d (q,), P (q, k) and S (k, k) of the submatrix ``diag(d) - P S P.T`` for the constraints `rows` (q,)."""
 
 
 class NodalField(Protocol):
@@ -191,7 +198,7 @@ class Constraints:
         Gaps at u = 0 without contact forces [length].
     positions : ndarray (m, dim)
         Points of the undeformed secondary surface at which the gaps are measured [length].
-    compliance : Compliance, optional
+    compliance : MultiplierCompliance, optional
         Compliance C of the constraints themselves [length / force].
     tangents : tuple of k csr_array (m, n_dofs)
         For each tangent, derivatives of the tangential displacement relative to the primary side with respect to the
@@ -244,7 +251,7 @@ class Constraints:
     B: csr_array
     gap0: Array
     positions: Array
-    compliance: Compliance | None = None
+    compliance: MultiplierCompliance | None = None
     tangents: tuple[csr_array, ...] = ()
     directions: tuple[Array, ...] = ()
     friction: Array = field(default_factory=np.empty(0).copy)
@@ -469,6 +476,16 @@ class _BlockDiagonal:
                 return self.block(rows)
             blocks.append(block)
         return FieldCompliance.stacked(blocks, lambda: self.block(rows))
+
+    def split(self, rows: Indices) -> tuple[Array, csr_array, Array]:
+        d, P_blocks, S_blocks = np.zeros(len(rows)), [csr_array((len(rows), 0))], []
+        for inner, (in_block, rows_of_pair) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
+            if inner is not None and len(in_block):
+                d[in_block], P, S = inner.split(rows_of_pair)
+                place = np.ones(len(in_block)), (in_block, np.arange(len(in_block)))
+                P_blocks.append(csr_array(csr_array(place, (len(rows), len(in_block))) @ P))
+                S_blocks.append(S)
+        return d, csr_array(hstack(P_blocks, format="csr")), block_diag(*S_blocks)
 
     def apply(self, multiplier: Array) -> Array:
         blocks = zip(self._compliances, np.split(multiplier, np.cumsum(self._sizes)[:-1]), strict=True)

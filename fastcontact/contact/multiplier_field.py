@@ -15,6 +15,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
 from fastcontact.linear.delassus import MAX_ROWS
 from fastcontact.linear.field_compliance import FieldCompliance
+from fastcontact.linear.sparse_rows import scaled
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +65,13 @@ class Projection:
         P = self.P[rows].toarray() * (areas > 0)[:, None]
         inverse = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
         return (np.diag(inverse) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
+
+    def split(self, rows: Indices) -> tuple[Array, csr_array, Array]:
+        """Return d (q,), P (q, k) and S (k, k) of the submatrix ``diag(d) - P S P.T``; see `MultiplierCompliance.split`."""
+        areas, k = np.where(self.mass is None, 0.0, self.areas[rows]), self.P.shape[1]
+        S = np.zeros((k, k)) if self.mass is None else self.mass.solve(np.eye(k)) / self.rho
+        d = np.divide(1.0, self.rho * areas, out=np.zeros_like(areas), where=areas > 0)
+        return d, scaled(self.P[rows], (areas > 0).astype(float)), S
 
     def block_operator(self, rows: Indices) -> Array | FieldCompliance:
         """Return the compliance of the points `rows` (q,) for linear solvers; see `Compliance.block_operator`."""

@@ -193,16 +193,6 @@ def newton(
 SLIP_COMPLIANCE = LENGTH_ROUND_OFF
 
 
-def compliance_of_each(F: Array, number: Indices) -> Array:
-    """Return the compliance (1 + k, 1 + k, m) of each constraint, given the compliance F (n, n) of all.
-
-    `number` (1 + k, m) are the numbers in F of the normal components, then of the components along each tangent. Components
-    with negative numbers have no compliance.
-    """
-    given = number >= 0
-    return np.where(given[:, None] & given, F[number[:, None], number], 0.0)
-
-
 def compliance_of_rows(rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
     """Return the compliance (1 + k, 1 + k, m) of each constraint for a diagonal stiffness matrix.
 

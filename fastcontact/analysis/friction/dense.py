@@ -17,12 +17,15 @@ With large coefficients of friction the solution may not be unique. The methods 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, eye_array
 
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction.cone_newton import Law, newton
+from fastcontact.analysis.friction.delassus import Delassus
 from fastcontact.analysis.solution import Forces
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.delassus import lu_solver
@@ -40,14 +43,14 @@ REGULARISATION = ROUND_OFF, LENGTH_ROUND_OFF
 
 
 def solve(
-    F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None, equality: Mask | None = None,
+    F: Delassus, free: Array, mu: Array, closed: Mask, guess: Array | None = None, equality: Mask | None = None,
     components: Indices | None = None,
 ) -> Forces:  # fmt: skip
     """Return the forces that satisfy unilateral contact and Coulomb's law.
 
     Parameters
     ----------
-    F : ndarray (n, n)
+    F : Delassus (n, n)
         Delassus operator of m constraints, symmetric and positive semidefinite [length / force]. Its rows and columns belong
         to the normal components of all constraints, then to their components along each of k tangents.
     free : ndarray (1 + k, m)
@@ -79,12 +82,12 @@ def solve(
     length = float(np.abs(free * unit).max()) or 1.0
     components = np.arange(free.size) if components is None else components
     units = unit[components % m]
-    F, best, iterations, elastic_slip = units[:, None] * F * units, None, 0, 0.0
+    F, best, iterations, elastic_slip = F.scaled(units), None, 0, 0.0
     if guess is not None:
         guess = guess / (length * unit)
-    for compliance in REGULARISATION if _dependent(F) else (0.0,):
+    for compliance in REGULARISATION if F.dependent else (0.0,):
         regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
-        F[regularised, regularised] += compliance
+        F = F.softened(spread(np.full(len(regularised), compliance), regularised, (len(F),)))
         problem = _Problem(F, free * unit / length, law, components)
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
@@ -106,21 +109,13 @@ def solve(
     return Forces(best.y * length * unit, gaps, best.closed, best.sticking | equality, settled, residual, iterations)
 
 
-def _dependent(F: Array) -> bool:
-    """Return whether rows of F, scaled to a diagonal of ones for the gaps, are linearly dependent up to round-off."""
-    try:
-        return bool(np.diag(np.linalg.cholesky(F)).min() ** 2 < LENGTH_ROUND_OFF)
-    except np.linalg.LinAlgError:
-        return True
-
-
 class _Problem:
     """The problem of `solve` in scaled units, for `cone_newton.newton`; see `cone_newton.Linearised`.
 
     F is scaled such that the compliance of each gap is one.
     """
 
-    def __init__(self, F: Array, free: Array, law: Law, components: Indices) -> None:
+    def __init__(self, F: Delassus, free: Array, law: Law, components: Indices) -> None:
         self.F, self.free, self.law, self.components = F, free, law, components
         self.round_off = SUM_ROUND_OFF * float(np.abs(free).max())
 
@@ -132,8 +127,8 @@ class _Problem:
         """See `cone_newton.Linearised`."""
         if not closed.any():
             return np.zeros_like(y), self.free
-        A, D, at = _equations(self.law, self.F, y, gaps, closed, sticking, self.components)
-        forces = spread(_dense_solution(A, -(D @ self.free.ravel()[at])), at, y.shape)
+        equations = _equations(self.law, self.F, y, gaps, closed, sticking, self.components)
+        forces = equations.forces(self.free, partial(_dense_solution, equations.A))
         return forces, self.gaps(forces)
 
     def starts(self, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
@@ -167,7 +162,7 @@ class _Problem:
         """
         compliance, last, halvings = NOTABLE, 1.0, 0
         while compliance > ROUND_OFF and halvings <= HALVINGS:
-            softened = _Problem(self.F + compliance * np.eye(len(self.F)), self.free, self.law, self.components)
+            softened = _Problem(self.F.softened(compliance), self.free, self.law, self.components)
             forces = newton(softened, y, softened.gaps(y), min_iterations=1)
             if forces.settled:
                 y, last, compliance, halvings = forces.y, compliance, NOTABLE * compliance, 0
@@ -190,30 +185,57 @@ def numbered(at: Indices, shape: tuple[int, ...]) -> Indices:
     return result
 
 
-def _equations(
-    law: Law, F: Array, y: Array, gaps: Array, closed: Mask, sticking: Mask, components: Indices
-) -> tuple[Array, csr_array, Indices]:
-    """Return A, D and the positions (n,) of the forces x in y of the equations ``A x + D free = 0`` of `closed` constraints.
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """The equations of closed constraints for their q forces x: ``A z = -right(free)`` with ``x = -H free + back z``.
 
-    A (n, n) is ``E + D F`` with E and D of `Law.linearised`. F belongs to the `components`, see `solve`.
+    They are equivalent to ``(E + D F) x = -D free`` with E and D of `Law.linearised`; see `delassus`. The forces x are at
+    the positions `at` (q,) in arrays (1 + k, m).
     """
+
+    A: Array
+    right: Callable[[Array], Array]
+    H: csr_array
+    back: csr_array
+    at: Indices
+
+    def forces(self, free: Array, solve: Callable[[Array], Array]) -> Array:
+        """Return the forces (1 + k, m), where `solve` solves systems with A. `free` (1 + k, m) are gaps without forces."""
+        values = free.ravel()[self.at]
+        return spread(self.back @ solve(-self.right(values)) - self.H @ values, self.at, free.shape)
+
+
+def _equations(
+    law: Law, F: Delassus, y: Array, gaps: Array, closed: Mask, sticking: Mask, components: Indices
+) -> _Equations:
+    """Return the equations of the `closed` constraints; F belongs to the `components`, see `solve`."""
     rows, selected = np.flatnonzero(closed), np.flatnonzero(closed[components % len(closed)])
-    number = numbered(components[selected], y.shape)[:, rows]
+    number, n = numbered(components[selected], y.shape)[:, rows], len(selected)
     shape = len(number), *number.shape
     row, column = np.broadcast_to(number[:, None], shape), np.broadcast_to(number, shape)
 
     def matrix(blocks: Array) -> csr_array:
         nonzero = (blocks != 0.0) & (row >= 0) & (column >= 0)
-        return csr_array((blocks[nonzero], (row[nonzero], column[nonzero])), shape=2 * (len(selected),))
+        return csr_array((blocks[nonzero], (row[nonzero], column[nonzero])), shape=(n, n))
 
-    E, D = map(matrix, law.linearised(y, gaps, rows, sticking))
-    A = np.asarray(D @ F[np.ix_(selected, selected)])
-    A += E
-    return A, D, components[selected]
+    E, D = law.linearised(y, gaps, rows, sticking)
+    F, at = F.among(selected), components[selected]
+    if F.U is None:
+        F_matrix, D_matrix = F.S, matrix(D)
+        F_matrix[np.arange(n), np.arange(n)] += F.d
+        A = np.asarray(D_matrix @ F_matrix)
+        A += matrix(E)
+        return _Equations(A, lambda free: D_matrix @ free, csr_array((n, n)), csr_array(eye_array(n)), at)
+    blocks, D_blocks = E + D * np.where(number >= 0, F.d[number], 1.0), D.transpose(2, 0, 1)
+    H = matrix(np.asarray(np.linalg.solve(blocks.transpose(2, 0, 1), D_blocks)).transpose(1, 2, 0))
+    HU, S = csr_array(H @ F.U), F.S
+    T = csr_array(F.U.T @ H)
+    A = np.asarray(csr_array((F.U.T @ HU).T) @ S).T + np.eye(len(S))
+    return _Equations(A, lambda free: S @ (T @ free), H, -HU, at)
 
 
 def response(
-    F: Array, law: Law, forces: Forces, held_slips: Mask, Q: csr_array | None, components: Indices
+    F: Delassus, law: Law, forces: Forces, held_slips: Mask, Q: csr_array | None, components: Indices
 ) -> Callable[[Array], Array]:
     """Return a function that computes the derivative of the solution `forces`.
 
@@ -226,26 +248,26 @@ def response(
     m = len(law.mu)
     unit = _units(F, m)
     units = unit[components % m]
-    A, D, at = _equations(
-        law, units[:, None] * F * units, forces.y / unit, forces.gaps * unit, forces.closed, forces.sticking, components
+    equations = _equations(
+        law, F.scaled(units), forces.y / unit, forces.gaps * unit, forces.closed, forces.sticking, components
     )
-    solve_dense = lu_solver(A)
+    solve_dense = lu_solver(equations.A)
 
     def force_change(gaps: Array) -> Array:
         values = spread(gaps if Q is None else Q @ gaps, components, forces.y.shape) * unit
         values[1:][held_slips] = 0.0
-        change = (spread(solve_dense(-(D @ values.ravel()[at])), at, values.shape) * unit).ravel()[components]
+        change = (equations.forces(values, solve_dense) * unit).ravel()[components]
         return change if Q is None else np.asarray(Q.T @ change)
 
     return force_change
 
 
-def _units(F: Array, m: int) -> Array:
+def _units(F: Delassus, m: int) -> Array:
     """Return the units (m,) of force in which the compliance of each gap is one.
 
     The parameter of the complementarity function, which multiplies gaps and slips, can then be one for all constraints.
     """
-    compliance = np.diag(F)[:m]
+    compliance = F.diagonal()[:m]
     return np.asarray(1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max())))
 
 
@@ -277,7 +299,7 @@ def _polyhedral_forces(problem: _Problem, edges: int) -> Array | None:
     X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), edge_directions.T]]), np.eye(m))
     X = np.hstack([X, -np.eye(len(X))[:, equations]])
     M = np.zeros((size, size))
-    M[:last, :last] = X[problem.components].T @ problem.F @ X[problem.components]
+    M[:last, :last] = X[problem.components].T @ (problem.F @ X[problem.components])
     M[last:, :m] = np.diag(problem.law.mu)
     M[last:, m:along_edges] = -np.tile(np.eye(m), edges)
     M[m:along_edges, last:] = np.tile(np.eye(m), edges).T

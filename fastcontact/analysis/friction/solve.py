@@ -15,17 +15,18 @@ import logging
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
+from scipy.linalg import block_diag
+from scipy.sparse import csc_array, csr_array, hstack, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
 from fastcontact.analysis.friction.cone_newton import (
     SLIP_COMPLIANCE,
     Law,
     aligning_rotation,
-    compliance_of_each,
     held_tangents,
     rotated,
 )
+from fastcontact.analysis.friction.delassus import Delassus
 from fastcontact.analysis.friction.dense import numbered, spread
 from fastcontact.analysis.solution import Accuracy, Forces, Path, SlipSoFar, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
@@ -34,6 +35,7 @@ from fastcontact.contact.pairing import normals
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import MAX_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
+from fastcontact.linear.sparse_rows import scaled
 
 log = logging.getLogger("fastcontact")
 
@@ -135,7 +137,7 @@ def _eliminated(
 def _with_included(
     included: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
 ) -> Solution:  # fmt: skip
-    """Return the solution with only the `included` constraints (m,), by the dense Delassus operator.
+    """Return the solution with only the `included` constraints (m,), by the Delassus operator.
 
     The gaps and slips of the other constraints follow from the displacements. The other parameters are those of `solve`, with
     initial `forces` (1 + k, m) or None [force].
@@ -145,37 +147,36 @@ def _with_included(
     # In arrays (1 + k, q), F has no rows for the slips of constraints whose pair has no friction.
     frictional = np.stack(constraints.directions)[:, rows].any(axis=(0, 2))
     components = np.flatnonzero(np.vstack([np.ones_like(frictional), *k * [frictional]]))
-    check_rows(len(components), MAX_ROWS_WITH_FRICTION)
     all_rows = csr_array(vstack([constraints.B, *constraints.tangents], format="csr"))
     place = (np.arange(1 + k)[:, None] * m + rows).ravel()[components]
     R = all_rows[place]
     gaps_at_rest = constraints.gaps_at_rest()
-    free, F = loaded.delassus(R)
+    free, F, basis = _delassus(loaded, R, k == 2 and constraints.compliance is not None)
     number = numbered(components, (1 + k, len(rows)))
     slips = np.arange(len(rows), len(F))
     # This compliance is added before held tangents are detected, since compliant tangents are not held.
-    F[slips, slips] += np.tile(constraints.tangential_softness[rows[frictional]], k)
-    Q = aligning_rotation(compliance_of_each(F, number)) if k == 2 else None
-    Q_F = None if Q is None else Q[components][:, components]
-    C = compliance_of_each(F if Q_F is None else np.asarray(Q_F @ (Q_F @ F).T), number)
+    F = F.softened(spread(np.tile(constraints.tangential_softness[rows[frictional]], k), slips, (len(F),)))
+    Q = aligning_rotation(F.of_each(number)) if k == 2 else None
+    Q_F = None if Q is None else csr_array(Q[components][:, components])
+    C = (F if Q_F is None else F.rotated(Q_F)).of_each(number)
     C[0, 0] += np.where(constraints.prescribed, constraints.softness, 0.0)[rows]
     held_slips = held_tangents(C) & frictional
     held_rows = number[1:][held_slips]
-    _add_compliance(F, constraints, rows, components)
-    F += loaded.rigid_compliance(R)
+    F = _with_compliance(replace(F, S=F.S + loaded.rigid_compliance(basis)), constraints, rows, components)
     free = spread(free, components, number.shape) + gaps_at_rest[:, rows]
     guess = None if forces is None else forces[:, rows]
     y0, closing = np.zeros_like(free), np.zeros_like(free)
     if path is not None:
         y0, closing = path.along(constraints.directions, rows)
     if Q is not None and Q_F is not None:
-        F = np.asarray(Q_F @ (Q_F @ F).T)
+        F = F.rotated(Q_F)
         free, y0, closing = (rotated(Q, values) for values in (free, y0, closing))
         guess = None if guess is None else rotated(Q, guess)
     if len(held_rows):
         prescribed = held_slips & constraints.imposes_slip(rows, Q)
-        F[held_rows], F[:, held_rows] = 0.0, 0.0
-        F[held_rows, held_rows] = np.where(prescribed, SLIP_COMPLIANCE * C[0, 0], np.diag(F).max())[held_slips]
+        values = np.where(prescribed, SLIP_COMPLIANCE * C[0, 0], F.diagonal().max())[held_slips]
+        F = F.scaled(1.0 - spread(np.ones(len(values)), held_rows, (len(F),)))
+        F = F.softened(spread(values, held_rows, (len(F),)))
         free[1:][held_slips & ~prescribed] = 0.0
         y0[1:][held_slips], closing[1:][held_slips] = 0.0, 0.0
     mu, equations = constraints.friction[rows], constraints.equality[rows]
@@ -191,10 +192,10 @@ def _with_included(
             given = np.flatnonzero(number[:, at] >= 0)
             n = number[:, at].ravel()[given]
             start = None if start is None else start[:, at]
-            result = dense.solve(F[np.ix_(n, n)], gaps[:, at], mu[at], closed[at], start, equations[at], given)
+            result = dense.solve(F.among(n), gaps[:, at], mu[at], closed[at], start, equations[at], given)
             y, (closed, sticking) = np.zeros_like(gaps), np.zeros((2, len(rows)), bool)
             y[:, at], closed[at], sticking[at] = result.y, result.closed, result.sticking
-            gaps += spread(F[:, n] @ result.y.ravel()[given], components, gaps.shape)
+            gaps += spread(F @ y.ravel()[components], components, gaps.shape)
             return replace(result, y=y, gaps=gaps, closed=closed, sticking=sticking)
 
         result, gaps_of_included, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
@@ -219,6 +220,22 @@ def _with_included(
             loaded, R, place, dense.response(F, Law(mu, equations), at_end, held_slips, Q_F, components)
         ),
     )  # fmt: skip
+
+
+def _delassus(loaded: Loaded, R: csr_array, factored: bool) -> tuple[Array, Delassus, csr_array]:
+    """Return the gaps and slips (n,) without contact forces, their Delassus operator, and the rows of its matrix S.
+
+    If the operator is `factored`, they are those of the displacements that R involves, otherwise R.
+    """
+    involved = np.unique(R.indices)
+    check_rows(len(involved) if factored else R.shape[0], MAX_ROWS_WITH_FRICTION)
+    if not factored:
+        free, F = loaded.delassus(R)
+        return free, Delassus(np.zeros(len(F)), F), R
+    entries = np.ones(len(involved)), (np.arange(len(involved)), involved)
+    basis, U = csr_array(entries, (len(involved), R.shape[1])), csr_array(R[:, involved])
+    u, inverse = loaded.delassus(basis)
+    return U @ u, Delassus(np.zeros(U.shape[0]), inverse, U), basis
 
 
 def _slip_so_far(
@@ -253,22 +270,33 @@ def _slip_so_far(
     return SlipSoFar(slip, slip_before_closing, traction, all_integrals, all_normal, begin)
 
 
-def _add_compliance(F: Array, constraints: Constraints, rows: Indices, components: Indices) -> None:
-    """Add, in place, the compliance of the constraints `rows` (q,) to their Delassus operator F (n, n).
+def _with_compliance(F: Delassus, constraints: Constraints, rows: Indices, components: Indices) -> Delassus:
+    """Return the sum of the Delassus operator F and the compliance of the constraints `rows` (q,).
 
     `components` (n,) are the positions, in arrays (1 + k, q), of the components that belong to F.
     """
-    if constraints.compliance is not None and len(rows):
+    at, dim = components % len(rows), constraints.positions.shape[1]
+    Z = np.concatenate(constraints.low_rank_compliance[:, rows])[components]
+    if constraints.compliance is not None:
         # C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
         # directions, which vary from one constraint to the next.
-        C = constraints.compliance.block(rows)
         along = np.stack(constraints.coupled_directions or constraints.directions)[:, rows]
         normal = normals(list(along))
         normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
-        frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])[components]
-        at = components % len(rows)
-        F += C[np.ix_(at, at)] * (frame @ frame.T)
-    if constraints.low_rank_compliance.size and len(rows):
-        Z = constraints.low_rank_compliance[:, rows].reshape(-1, constraints.low_rank_compliance.shape[2])[components]
-        F += Z @ Z.T
-    F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
+        frame = np.concatenate([normal[None], along]).reshape(-1, dim)[components]
+        if F.U is None:
+            F.S[:] += constraints.compliance.block(rows)[np.ix_(at, at)] * (frame @ frame.T)
+        else:
+            d, P, inverse_mass = constraints.compliance.split(rows)
+            added = np.where(d > 0.0, 0.0, F.diagonal()[: len(rows)])  # and subtracted in the next term
+            (rigid,) = np.nonzero(added[at])
+            columns = [scaled(P[at], along_axis) for along_axis in frame.T]
+            columns += [csr_array((np.ones(len(rigid)), (rigid, np.arange(len(rigid)))), (len(F), len(rigid)))]
+            S = block_diag(F.S, *dim * [-inverse_mass], -np.diag(added[at[rigid]]), np.eye(Z.shape[1]))
+            U = csc_array(hstack([F.U, *columns, csr_array(Z)], format="csc"))
+            used = np.flatnonzero(np.diff(U.indptr))
+            check_rows(len(used), MAX_ROWS_WITH_FRICTION)
+            F = Delassus(F.d + (d + added)[at], S[np.ix_(used, used)], csr_array(U[:, used]))
+    if F.U is None and Z.size:
+        F.S[:] += Z @ Z.T
+    return F.softened(spread(constraints.softness[rows], np.arange(len(rows)), (len(F),)))

@@ -15,7 +15,7 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Compliance, Constraints, Linearised
+from fastcontact.contact.constraints import Constraints, Linearised, MultiplierCompliance
 from fastcontact.contact.held_motions import (
     SAME_DIRECTION,
     HeldMotions,
@@ -353,7 +353,7 @@ class Formulation(ABC):
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
 
     def assembled(
-        self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, config: Configuration
+        self, candidates: Candidates, pairing: Pairing, compliance: MultiplierCompliance | None, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired candidates, including tangents if `has_tangents`.
 

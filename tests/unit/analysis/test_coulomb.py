@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fastcontact.analysis.friction import cone_newton, dense
+from fastcontact.analysis.friction.delassus import Delassus
 
 
 def residual(F, free, mu, y):
@@ -39,7 +40,7 @@ def problem(rng, most_friction):
 
 
 def solved(F, free, mu, closed=None):
-    return dense.solve(F, free, mu, np.zeros(len(mu), bool) if closed is None else closed)
+    return dense.solve(Delassus(np.zeros(len(F)), F), free, mu, np.zeros(len(mu), bool) if closed is None else closed)
 
 
 @settings(max_examples=12, deadline=None)

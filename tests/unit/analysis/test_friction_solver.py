@@ -14,10 +14,10 @@ from fastcontact.analysis.friction import cone_newton, dense
 from fastcontact.analysis.friction import solve as friction
 from fastcontact.analysis.friction.cone_newton import (
     aligning_rotation,
-    compliance_of_each,
     compliance_of_rows,
     held_tangents,
 )
+from fastcontact.analysis.friction.delassus import Delassus
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.multiplier_field import Projection
@@ -35,14 +35,18 @@ def test_tangents_complete_normals(dim):
     np.testing.assert_allclose(normals(tangents(normal)), normal, atol=1e-15)
 
 
+def operator(F):
+    return Delassus(np.zeros(len(F)), F)
+
+
 def componentwise(C, along):
     """The compliance C of force vectors as that of their components, which is added to an operator of zeros."""
-    (k, m, dim), F = along.shape, np.zeros(2 * ((1 + len(along)) * len(C),))
+    k, m, dim = along.shape
+    F = operator(np.zeros(2 * ((1 + k) * m,)))
     rows = csr_array((m, m * dim))
     positions = np.zeros((m, dim))
     constraints = Constraints(rows, np.zeros(m), positions, DenseCompliance(C), k * (rows,), tuple(along))
-    friction._add_compliance(F, constraints, np.arange(m), np.arange(len(F)))
-    return F
+    return friction._with_compliance(F, constraints, np.arange(m), np.arange(len(F))).S
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -95,13 +99,11 @@ def test_tangents_turn_to_the_slip_that_supports_leave():
     K_inverse[held], K_inverse[:, held] = 0.0, 0.0
     F = R @ K_inverse @ R.T
     number = np.arange(6).reshape(3, 2)
-    assert not len(np.flatnonzero(held_tangents(compliance_of_each(F, number))))
-    Q = aligning_rotation(compliance_of_each(F, number))
+    assert not len(np.flatnonzero(held_tangents(operator(F).of_each(number))))
+    Q = aligning_rotation(operator(F).of_each(number))
     np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(6), atol=1e-15)
-    np.testing.assert_array_equal(
-        held_tangents(compliance_of_each(Q @ (Q @ F).T, number)), [[False, False], [True, True]]
-    )
-    assert aligning_rotation(compliance_of_each(R @ (A @ A.T) @ R.T, number)) is None
+    np.testing.assert_array_equal(held_tangents(operator(F).rotated(Q).of_each(number)), [[False, False], [True, True]])
+    assert aligning_rotation(operator(R @ (A @ A.T) @ R.T).of_each(number)) is None
 
 
 def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
@@ -172,7 +174,7 @@ def test_a_kept_pairing_serves_friction_through_steps():
 def test_a_guess_does_not_leave_the_gap_of_a_soft_constraint_open():
     F, free = np.diag([1.0, 1e7, 1.0, 1.0]), np.array([[-1.0, -1e-3], [0.1, 0.0]])
     guess = np.array([[1.0, 1e-10 * (1.0 - 1e-7)], [-0.1, 0.0]])
-    forces = dense.solve(F, free, np.array([0.3, 0.3]), np.ones(2, bool), guess)
+    forces = dense.solve(operator(F), free, np.array([0.3, 0.3]), np.ones(2, bool), guess)
     assert forces.settled
     np.testing.assert_allclose(forces.gaps[0], 0.0, atol=1e-14)
 
@@ -184,12 +186,52 @@ def test_components_without_friction_need_no_rows():
     components = np.flatnonzero(np.vstack([np.ones(m), mu, mu]))
     given, F = np.ix_(components, components), np.eye(3 * m)
     F[given] = (A @ A.T)[given]
-    whole = dense.solve(F, free, mu, free[0] < 0.0)
-    part = dense.solve(F[given], free, mu, free[0] < 0.0, components=components)
+    whole = dense.solve(operator(F), free, mu, free[0] < 0.0)
+    part = dense.solve(operator(F[given]), free, mu, free[0] < 0.0, components=components)
     assert part.settled
     assert 2 < part.closed.sum() < m
     np.testing.assert_allclose(part.y, whole.y, atol=1e-12 * np.abs(whole.y).max())
     np.testing.assert_allclose(part.gaps.ravel()[components], whole.gaps.ravel()[components], atol=1e-11)
+
+
+def pressed_blocks(beside):
+    """Return two blocks, pressed and sheared, cut by a plane of symmetry, or `beside` a rigid plane without friction."""
+    lower = fc.generate.box((2.0, 2.0, 1.0), (4, 4, 2))
+    upper = fc.generate.box((1.0, 1.0, 0.5), (3, 3, 2), origin=(0.5, 0.0, 1.0))
+    mesh = fc.generate.union(lower, fc.generate.renamed(upper, lambda name: f"upper {name}"))
+    model = fc.Model(mesh, kinematics="3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("YMIN", "y")
+    model.fix("upper YMIN", "y")
+    model.prescribe("upper ZMAX", z=-0.01, x=0.004)
+    formulation = "mortar" if beside else "continuous"
+    model.add_contact("joint", secondary="upper ZMIN", primary="ZMAX", friction=0.3, formulation=formulation)
+    if beside:
+        plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        model.add_obstacle("plane", secondary="ZMIN", obstacle=plane, formulation="continuous")
+        model.fix("XMIN", "x")
+    else:
+        model.fix("ZMIN", "xyz")
+    return model
+
+
+@pytest.mark.filterwarnings("ignore:.*oscillate from node to node")
+@pytest.mark.parametrize("beside", [False, True])
+def test_pressure_fields_are_solved_as_with_the_whole_matrix(beside, monkeypatch):
+    model, operators, inner = pressed_blocks(beside), [], friction._delassus
+    monkeypatch.setattr(friction, "_delassus", lambda *system: operators.append(inner(*system)) or operators[-1])
+    (factored,) = fc.solve(model, 1)
+    assert all(F.U is not None for _, F in operators)
+    monkeypatch.setattr(friction, "_delassus", lambda loaded, R, _: inner(loaded, R, False))
+    (whole,) = fc.solve(model, 1)
+    for name, contact in whole.contact.items():
+        found, size = factored.contact[name], np.abs(contact.force_vectors).max()
+        np.testing.assert_allclose(found.force_vectors, contact.force_vectors, atol=1e-10 * size)
+        np.testing.assert_array_equal(found.sticking, contact.sticking)
+    count = [
+        sum(pairing["active_set_iterations"] for pairing in step.iterations["history"]) for step in (factored, whole)
+    ]
+    assert count[0] <= count[1]
 
 
 def test_pivots_against_all_bases():

@@ -1,0 +1,106 @@
+r"""The Delassus operator F of constraints with friction.
+
+The compliance of n forces at integration points of a pressure field is a diagonal matrix minus a matrix of small rank
+(`linear.field_compliance`). Their Delassus operator is therefore kept in the form :math:`F = \mathrm{diag}(d) + U S U^T` with
+a sparse matrix U. With ``x = -H (free + U z)`` and ``H = (E + D diag(d))^-1 D``, the equations ``(E + D F) x = -D free`` of
+a Newton step are equivalent to ``(1 + S U^T H U) z = -S U^T H free``, where z contains displacements and the values of the
+field. On surfaces in 3D, z has fewer components than x. Other operators have the form :math:`F = \mathrm{diag}(d) + S`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+
+from fastcontact.arrays import Array, Indices
+from fastcontact.linear.sparse_rows import scaled
+from fastcontact.round_off import LENGTH_ROUND_OFF
+
+
+@dataclass(frozen=True, eq=False)
+class Delassus:
+    """The symmetric matrix ``F = diag(d) + U S U.T`` (n, n), or ``diag(d) + S`` without U; see the docstring of the module.
+
+    Attributes
+    ----------
+    d : ndarray (n,)
+        Positive if U is given and the compliance of the constraints is included [length / force].
+    S : ndarray (r, r)
+        [length / force].
+    U : csr_array (n, r), optional
+        [-].
+    """
+
+    d: Array
+    S: Array
+    U: csr_array | None = None
+
+    def __len__(self) -> int:
+        return len(self.d)
+
+    def __matmul__(self, x: Array) -> Array:
+        product = self.S @ x if self.U is None else self.U @ (self.S @ (self.U.T @ x))
+        return np.asarray(product + (self.d * x.T).T)
+
+    def diagonal(self) -> Array:
+        """Return the diagonal (n,) of F."""
+        S = self.S.diagonal() if self.U is None else self.U.multiply(self.U @ self.S).sum(axis=1)
+        return np.asarray(self.d + S)
+
+    def of_each(self, number: Indices) -> Array:
+        """Return the compliance (1 + k, 1 + k, m) of each constraint.
+
+        `number` (1 + k, m) are the numbers in F of the normal components, then of the components along each tangent.
+        Components with negative numbers have no compliance.
+        """
+        given = number >= 0
+        if self.U is None:
+            values = self.S[number[:, None], number]
+        else:
+            US = self.U @ self.S
+            values = np.array([[self.U[j].multiply(US[i]).sum(axis=1) for j in number] for i in number])
+        values = values + np.where(number[:, None] == number, self.d[number], 0.0)
+        return np.where(given[:, None] & given, values, 0.0)
+
+    def softened(self, softness: Array | float) -> Delassus:
+        """Return the sum of F and a diagonal matrix."""
+        return replace(self, d=self.d + softness)
+
+    def scaled(self, units: Array) -> Delassus:
+        """Return F, whose rows and columns are multiplied by `units` (n,)."""
+        if self.U is None:
+            return Delassus(self.d * units**2, units[:, None] * self.S * units)
+        return Delassus(self.d * units**2, self.S, scaled(self.U, units))
+
+    def rotated(self, Q: csr_array) -> Delassus:
+        """Return ``Q F Q.T`` for a matrix Q (n, n) that only rotates components with the same value of d."""
+        if self.U is None:
+            return Delassus(self.d, np.asarray(Q @ (Q @ self.S).T))
+        return replace(self, U=csr_array(Q @ self.U))
+
+    def among(self, n: Indices) -> Delassus:
+        """Return the submatrix of the rows and columns `n`."""
+        if self.U is None:
+            return Delassus(self.d[n], self.S[np.ix_(n, n)])
+        return Delassus(self.d[n], self.S, self.U[n])
+
+    @property
+    def dependent(self) -> bool:
+        """Whether rows are linearly dependent up to round-off, if F is scaled to a diagonal of ones for the gaps.
+
+        With U, F can be singular only for forces in the range of the columns of ``diag(d)^-1 U`` with negative values in S.
+        """
+        if self.U is None:
+            matrix = self.S + np.diag(self.d)
+        else:
+            N = scaled(self.U, 1.0 / self.d)[:, self.S.diagonal() < 0.0]
+            size = np.sqrt(N.multiply(N).sum(axis=0))
+            N = csr_array(N[:, size > 0.0] @ diags_array(1.0 / size[size > 0.0]))
+            V = csr_array((self.U.T @ N).T)
+            matrix = V @ (V @ self.S).T + N.T @ scaled(N, self.d)
+        try:
+            return bool(np.diag(np.linalg.cholesky(matrix)).min() ** 2 < LENGTH_ROUND_OFF)
+        except np.linalg.LinAlgError:
+            return True
