@@ -151,7 +151,10 @@ def _with_included(
     place = (np.arange(1 + k)[:, None] * m + rows).ravel()[components]
     R = all_rows[place]
     gaps_at_rest = constraints.gaps_at_rest()
-    free, F, basis = _delassus(loaded, R, k == 2 and constraints.compliance is not None)
+    rigid_compliance = loaded.rigid_compliance(R)
+    # The compliance of soft springs is so large that the factored form would not be accurate.
+    factored = k == 2 and constraints.compliance is not None and not np.any(rigid_compliance)
+    free, F = _delassus(loaded, R, factored)
     number = numbered(components, (1 + k, len(rows)))
     slips = np.arange(len(rows), len(F))
     # This compliance is added before held tangents are detected, since compliant tangents are not held.
@@ -162,7 +165,9 @@ def _with_included(
     C[0, 0] += np.where(constraints.prescribed, constraints.softness, 0.0)[rows]
     held_slips = held_tangents(C) & frictional
     held_rows = number[1:][held_slips]
-    F = _with_compliance(replace(F, S=F.S + loaded.rigid_compliance(basis)), constraints, rows, components)
+    F = _with_compliance(F, constraints, rows, components)
+    if not factored:
+        F = replace(F, S=F.S + rigid_compliance)
     free = spread(free, components, number.shape) + gaps_at_rest[:, rows]
     guess = None if forces is None else forces[:, rows]
     y0, closing = np.zeros_like(free), np.zeros_like(free)
@@ -222,20 +227,17 @@ def _with_included(
     )  # fmt: skip
 
 
-def _delassus(loaded: Loaded, R: csr_array, factored: bool) -> tuple[Array, Delassus, csr_array]:
-    """Return the gaps and slips (n,) without contact forces, their Delassus operator, and the rows of its matrix S.
-
-    If the operator is `factored`, they are those of the displacements that R involves, otherwise R.
-    """
+def _delassus(loaded: Loaded, R: csr_array, factored: bool) -> tuple[Array, Delassus]:
+    """Return the gaps and slips (n,) without contact forces, and their Delassus operator, `factored` with U = R or not."""
     involved = np.unique(R.indices)
     check_rows(len(involved) if factored else R.shape[0], MAX_ROWS_WITH_FRICTION)
     if not factored:
         free, F = loaded.delassus(R)
-        return free, Delassus(np.zeros(len(F)), F), R
-    entries = np.ones(len(involved)), (np.arange(len(involved)), involved)
-    basis, U = csr_array(entries, (len(involved), R.shape[1])), csr_array(R[:, involved])
-    u, inverse = loaded.delassus(basis)
-    return U @ u, Delassus(np.zeros(U.shape[0]), inverse, U), basis
+        return free, Delassus(np.zeros(len(F)), F)
+    identity = np.ones(len(involved)), (np.arange(len(involved)), involved)
+    u, inverse = loaded.delassus(csr_array(identity, (len(involved), R.shape[1])))
+    U = csr_array(R[:, involved])
+    return U @ u, Delassus(np.zeros(U.shape[0]), inverse, U)
 
 
 def _slip_so_far(
