@@ -38,7 +38,7 @@ class MeshError(FastcontactError):
 
 
 class ModelError(FastcontactError):
-    """A model or an argument is incomplete, invalid or contradictory, for example a material, a support or a load."""
+    """A model, a part of it (such as a material or a load) or an argument is incomplete, invalid or contradictory."""
 
 
 class ContactError(FastcontactError):

@@ -31,7 +31,7 @@ class HertzLine:
     kinematics : {"plane_strain", "plane_stress"}
         Plane strain (long cylinders) or plane stress (thin discs).
     E_star : float
-        Contact modulus of these kinematics, `Bodies.E_star` or `Bodies.E_star_plane_stress` [pressure].
+        Contact modulus for `kinematics`, `Bodies.E_star` or `Bodies.E_star_plane_stress` [pressure].
     R_effective : float
         Relative radius of curvature R, with 1/R = 1/R1 + 1/R2 [length].
     radius : float
@@ -69,7 +69,7 @@ class HertzLine:
         return _half_plane.stress(x, y, self.radius, self.pressure_max, self._nu(nu), self.kinematics)
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) [pressure] on the axis at `depth` (...) [length], >= 0 (Johnson 1985, eqs 4.46)."""
+        """Return the stresses (..., 4) [pressure] on the line x = 0 at `depth` (...) [length], >= 0 (Johnson, eqs 4.46)."""
         return self.stress(np.zeros_like(depths := array("depth", depth)), -depths, nu)
 
     def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
@@ -94,7 +94,7 @@ class HertzLine:
         return self.displacement(x, np.zeros_like(array("x", x)), body=body)
 
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
-        """Return the largest von Mises stress on the axis x = 0 and its depth.
+        """Return the largest von Mises stress on the line x = 0 and its depth.
 
         At the depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), the von Mises stress is
         p0 (w - s) sqrt(3 s^2/w^2 + e^2) by eqs 4.46 of Johnson (1985). Its maximum lies at the surface, or where
@@ -123,6 +123,7 @@ class HertzLine:
 def _solve(bodies: Bodies, kinematics: str, R: float, name: str, value: float) -> HertzLine:
     """Return the contact in which the quantity called `name` has the given value."""
     E_star = bodies.E_star if kinematics == "plane_strain" else bodies.E_star_plane_stress
+    # Coefficients and exponents of powers of the radius.
     laws = {"radius": (1.0, 1.0), "force": (0.25 * math.pi * E_star / R, 2.0), "pressure_max": (0.5 * E_star / R, 1.0)}
     return HertzLine(bodies, kinematics, E_star, R, **quantities(laws, name, value))
 

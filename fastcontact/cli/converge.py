@@ -71,7 +71,7 @@ def _run_adaptive(options: Namespace) -> int:
 
 
 def _single_name(text: str | None, option: str) -> str | None:
-    """Return the name in a text, or None if there is no text; CaseError for several names."""
+    """Return the only name in a string, or None if there is none. Raises CaseError if there are several names."""
     names = _study.split(text) or []
     if len(names) > 1:
         raise CaseError(f"adaptive refinement takes one {option}, not {len(names)}: {text}")

@@ -92,7 +92,7 @@ def run(options: Namespace) -> int:
 
 
 def _modes(options: Namespace, case: Case, last: StepResult) -> Any:
-    """Return the natural modes that the case or the command requests, after writing them to the file of the options."""
+    """Return the natural modes that the case or the command requests, and write them to the file of ``--modes``."""
     arguments = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
     if case.modes is None and not options.modes and not arguments:
         return None
@@ -119,7 +119,7 @@ def _diameters(text: str | None) -> dict[str, Any]:
 
 
 def _new_steps(options: Namespace, case: Case, earlier_steps: Sequence[StepResult] = ()) -> Iterator[StepResult]:
-    """Check the model, and return an iterator that computes the steps after the steps `earlier_steps`."""
+    """Check the model, and return an iterator that computes the steps that follow `earlier_steps`."""
     from fastcontact.analysis.run import solve_steps
 
     settings = {**case.solve_arguments, "linear_solver": options.linear or case.linear_solver}
@@ -153,8 +153,8 @@ def _write_steps(
         try:
             for last in new_steps or _new_steps(options, case, writer.done):
                 last = case.finished(last)
-                error = {ERROR_FIELD: estimate_error(case.model, last).cells} if fields else {}
-                writer.write(dataclasses.replace(last, cell_fields=error) if fields else last)
+                cell_fields = {ERROR_FIELD: estimate_error(case.model, last).cells} if fields else {}
+                writer.write(dataclasses.replace(last, cell_fields=cell_fields) if fields else last)
                 steps.append(step_entry(last))
                 progress.step(last, writer.n_steps)  # n_steps excludes steps that are still being written
             writer.wait()
@@ -166,7 +166,7 @@ def _write_steps(
     return len(earlier), list(dict.fromkeys(text for _, texts in earlier for text in texts)), last, steps
 
 
-def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:
+def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary_path: str | None) -> None:
     """Add a note on the number of complete steps to an error, and write both to the summary file."""
     try:
         writer.wait()
@@ -175,8 +175,10 @@ def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary:
     steps = "one complete step" if writer.n_steps == 1 else f"all {writer.n_steps} complete steps"
     content = f"keeps {steps}: 'fastcontact run --resume' continues from there"
     error.add_note(f"'{output}' {content if writer.n_steps else 'contains no complete step'}")
-    if summary:  # replaces the summary of an earlier run
-        write_json(summary, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps})
+    if summary_path:  # replaces the summary of an earlier run
+        write_json(
+            summary_path, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps}
+        )
 
 
 def _check_same_case(case: Any, earlier_steps: Sequence[Any], output: Path) -> None:
@@ -204,7 +206,7 @@ def _warn_of_steps_outside_ramp(case: Case, factors: Sequence[float], output: Pa
 def _files_message(output: Path, n_done: int, total: int, other_files: list[str]) -> str:
     """Return a message on the files written, with the number of steps `n_done` before the run."""
     if n_done == total:
-        message = f"{output} was complete with {total} steps, so that no step was solved"
+        message = f"{output} was already complete with {total} steps, so no step was solved"
         return "; wrote ".join([message, ", ".join(other_files)] if other_files else [message])
     resumed = f" (resumed after step {n_done})" if n_done else ""
     return f"wrote {', '.join([f'{output}{resumed}', *other_files])}"

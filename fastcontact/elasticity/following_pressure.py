@@ -13,12 +13,12 @@ from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
 # Number of quadrature points in each direction of a facet. With this number, a constant pressure on quadratic facets is
-# integrated exactly, also in axisymmetry.
+# integrated exactly, even in axisymmetry.
 POINTS = 4
 
 
 class FollowerPressure:
-    """A pressure along the normals of deformed facets, whose values are evaluated at reference positions.
+    """A pressure that acts along the normals of deformed facets, with values evaluated at the undeformed positions.
 
     Parameters
     ----------

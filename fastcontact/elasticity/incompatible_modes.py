@@ -54,7 +54,10 @@ def tables(name: str) -> Tables:
 
 
 def with_modes(name: str, treatment: AnyArray | None) -> Mask | None:
-    """Return a mask (n_moduli,) of moduli with incompatible modes in elements of type `name`; None if there are none."""
+    """Return a mask (n_moduli,) of the moduli of materials that use incompatible modes in elements of type `name`.
+
+    None is returned if the element type does not support these modes, or no material uses them.
+    """
     if treatment is None or name not in BENDING:
         return None
     has_modes = (np.asarray(treatment).astype(np.uint8) & MODES) > 0

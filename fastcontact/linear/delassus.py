@@ -210,5 +210,5 @@ def solve_multipliers(delassus: Array, rhs: Array, C: Array | FieldCompliance | 
 
 
 def _round_off(delassus: Array) -> float:
-    """Return a bound of the round-off in the pivots of a matrix (m, m), relative to its diagonal [-]."""
+    """Return a bound on the round-off in the pivots of a matrix (m, m), relative to its diagonal [-]."""
     return 10.0 * len(delassus) * float(np.finfo(float).eps)

@@ -110,8 +110,8 @@ def check_cells(mesh: Mesh) -> None:
     """Check that every solid cell has a positive Jacobian at its default quadrature points.
 
     Raises MeshError if a cell is degenerate, that is if all its Jacobians are zero up to round-off; if it is inverted, that
-    is if another Jacobian is not positive; if it contains a node twice; or if two cells have the same nodes. The message
-    states the number and the position of the first such cell.
+    is if it is not degenerate but has a Jacobian that is not positive; if it contains a node twice; or if two cells have
+    the same nodes. The message states the number and the position of the first such cell.
     """
     for name in mesh.solids:
         _check_nodes(mesh, name)
@@ -159,7 +159,7 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
         node = int(nodes[rows[0], :-1][repeated[rows[0]]][0])
         raise MeshError(
             f"{_cell_text(mesh, name, int(rows[0]))} has point {node} twice (number of such cells: {len(rows)}): "
-            "write it as the element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
+            "replace it by the element to which it collapses, a triangle, wedge, pyramid or tetrahedron"
         )
 
 
@@ -181,7 +181,7 @@ def _check_duplicates(mesh: Mesh, name: str) -> None:
 
 
 def _cell_text(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
-    """Return a text with the number, the element type, the position and, if given, the `measure` of a cell, for messages."""
+    """Return the number, the element type, the position and, if given, the `measure` of a cell, as part of a message."""
     centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
     size = "" if measure is None else f", {'area' if mesh.dim == 2 else 'volume'} {measure:.3g}"
     return f"cell {mesh.offsets[name] + row} ({name} at ({centre}){size})"

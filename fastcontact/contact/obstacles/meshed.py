@@ -28,10 +28,10 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
-    Normals must point out of the obstacle, towards the body. In 2D the normal of a line points to its right. In 3D the nodes
-    of a face are in counter-clockwise order, seen from the tip of its normal. Facets on the outside of solid cells are an
-    exception: their normals point out of these cells. Distances from curved facets are exact. Beyond the border of an open
-    surface there is no contact.
+    Normals must point out of the obstacle, towards the body. In 2D the normal of a line points to the right of the direction
+    from its first to its second node. In 3D the nodes of a face are in counter-clockwise order, seen from the tip of its
+    normal. Facets on the outside of solid cells are an exception: their normals point out of these cells. Distances from
+    curved facets are exact. Beyond the border of an open surface there is no contact.
 
     Parameters
     ----------

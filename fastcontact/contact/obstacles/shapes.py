@@ -77,7 +77,9 @@ class HalfSpace:
 @typed(ContactError)
 @dataclass(frozen=True)
 class Sphere:
-    """A ball, or a spherical cavity if `hollow`; in plane models a circular cylinder, in axisymmetry a ball on the axis.
+    """A ball, or a spherical cavity if `hollow`.
+
+    In plane models it represents a circular cylinder. In axisymmetry it is a torus if the centre is not on the axis.
 
     Parameters
     ----------
@@ -160,7 +162,7 @@ class Cylinder:
 @typed(ContactError)
 @dataclass(frozen=True)
 class Height:
-    """The region below (or above) a height that is a function of the other coordinates.
+    """The region below or above a surface whose height is a function of the other coordinates.
 
     Parameters
     ----------
@@ -238,7 +240,7 @@ def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
 
 @typed(ContactError)
 def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
-    """Return a cone, a wedge in two dimensions; at its tip the normal is the axis.
+    """Return a cone, a wedge in two dimensions; at its tip the normal is parallel to the axis.
 
     Parameters
     ----------

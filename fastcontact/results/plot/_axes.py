@@ -25,7 +25,7 @@ else:  # Matplotlib is imported only when a plot is drawn
 
 Units = str | Mapping[str, str]
 UNITS: Mapping[str, str] = {"length": "mm", "force": "N", "pressure": "MPa"}
-# Default of arguments `units`, which selects the units of the model.
+# Default value of the argument `units`: the units of the model.
 MODEL_UNITS: Mapping[str, str] = {}
 
 
@@ -150,7 +150,7 @@ LETTER_WIDTH = 0.09
 def size_around(points: Array, smallest_height: float = 3.2) -> tuple[float, float]:
     """Return the width and the height of a figure for a body, with space for a colour bar, labels and a title [inch].
 
-    `points` (n, 2) are those of the body [length], and `smallest_height` is the smallest height.
+    `points` (n, 2) are those of the body [length], and `smallest_height` is a lower bound on the height [inch].
     """
     width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
     return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, smallest_height)
@@ -171,17 +171,17 @@ def label_axes(
     `artist` has the colour scale of `plot_field`. `points` (n, 2) are those of a plane body [length]; None for 3D axes.
     `alone` states whether the figure has no other axes.
     """
-    caption, shrink, legend_height = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
+    caption, shrink, legend_y = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
     if points is not None:
         width, height = np.ptp(points, axis=0)
         caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER_WIDTH))
         shrink = float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))  # shorter for flat bodies
-        half_inch = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
-        legend_height = half_inch if alone else -0.09
+        half_inch_below = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
+        legend_y = half_inch_below if alone else -0.09
         axes.set_aspect("equal")
         axes.locator_params(axis="x", nbins=6, steps=[1, 2, 5, 10])  # space for labels such as 0.0025
     axes.figure.colorbar(artist, ax=axes, label=caption, shrink=shrink)
     axes.set_title(heading, fontsize="medium", pad=18 if points is None else None)
     axes.set(**{f"{axis}label": axis_label(label, units, "length") for axis, label in zip("xyz", labels)})
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, legend_height))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, legend_y))
     return axes

@@ -90,7 +90,7 @@ def test_an_interrupted_run_goes_on_and_a_complete_one_stays(whole, path, capsys
     before = path.read_bytes()
     assert main(["run", str(case), "-o", str(path), "--resume"]) == 0
     captured = capsys.readouterr()
-    assert f"{path} was complete with {STEPS} steps, so that no step was solved" in captured.out
+    assert f"{path} was already complete with {STEPS} steps, so no step was solved" in captured.out
     assert captured.err.count(DOUBT) == 1
     assert path.read_bytes() == before
 
