@@ -69,25 +69,25 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ConvergenceError
         If the step does not converge.
     """
-    load = cold_load = problem.load_at(instant)
+    load = load_without_conduction = problem.load_at(instant)
     if problem.heat is not None:
         rise = first_rise(problem, problem.heat, state, instant)
-        load = thermal_load(problem, cold_load, rise)
+        load = thermal_load(problem, load_without_conduction, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
-    begin = prepare_start(problem, state, index, load)
-    heat_solution, solution = None, newton(begin, load)
+    context = prepare_start(problem, state, index, load)
+    heat_solution, solution = None, newton(context, load)
     if problem.heat is not None:
         heat_solution, solution = settle_heat(
-            problem, begin.state, cold_load, instant, rise, solution, partial(newton, begin)
+            problem, context.state, load_without_conduction, instant, rise, solution, partial(newton, context)
         )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
-    return _end_of_step(problem, begin.state, load, solution, iterations, (index, instant), heat_solution)
+    return _end_of_step(problem, context.state, load, solution, iterations, (index, instant), heat_solution)
 
 
 def _end_of_step(
     problem: Problem, start: State, load: StepLoad, solution: StepEquilibrium, iterations: dict[str, Any],
-    instant: tuple[int, float], heat_solution: HeatSolution | None,
+    number_and_instant: tuple[int, float], heat_solution: HeatSolution | None,
 ) -> tuple[State, StepResult]:  # fmt: skip
     """Return the state and the result at the end of a load step.
 
@@ -101,7 +101,7 @@ def _end_of_step(
         The converged equilibrium.
     iterations : dict
         Numbers of iterations, for `StepResult.iterations`; it is modified.
-    instant : (int, float)
+    number_and_instant : (int, float)
         Number of the step, and pseudo-time at its end.
     heat_solution : HeatSolution, optional
         The converged temperatures, in models with conduction of heat.
@@ -109,7 +109,7 @@ def _end_of_step(
     settled, u, balance = solution.settled, solution.u, solution.balance
     end = replace(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        instant=instant[1], rise=None if heat_solution is None else heat_solution.rise,
+        instant=number_and_instant[1], rise=None if heat_solution is None else heat_solution.rise,
     )  # fmt: skip
     bodies = None
     if problem.bodies is not None and solution.terms is not None:
@@ -135,7 +135,8 @@ def _end_of_step(
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and end.rigid is not None:
-        scale = end.largest_rigid_force  # may be round-off beside contact forces, which are round-off without loads
+        # May be round-off relative to contact forces. Without loads it is zero, and contact forces are round-off.
+        scale = end.largest_rigid_force
         iterations["regularised"] = problem.floating_bodies.report(end.rigid, scale and max(scale, end.largest_force))
         if settled is not None:
             forces = settled.constraints, settled.solution.multiplier
@@ -144,7 +145,7 @@ def _end_of_step(
             moved = {"undetermined": free.by_body(), "moved": largest((u - start.u)[moving])}
             iterations["regularised"] |= moved
     end = replace(end, solver=problem.solver.snapshot())
-    result = recover(problem, end, contact, balance.reaction, iterations, instant, bodies)
+    result = recover(problem, end, contact, balance.reaction, iterations, number_and_instant, bodies)
     return end, result if heat_solution is None else heat_solution.with_heat_results(problem, result)
 
 
@@ -164,8 +165,8 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     if problem.pairs and problem.model.springs:
         # Springs of the model may be weak: without contact, bodies on them have large displacements, and gaps are
         # differences of such displacements, each with an error of a few units in the last place.
-        from_zero = largest(loaded.full_solution(zero))
-        round_off = max(round_off, 16 * np.finfo(float).eps * from_zero)
+        largest_displacement = largest(loaded.full_solution(zero))
+        round_off = max(round_off, 16 * np.finfo(float).eps * largest_displacement)
     if problem.floating_bodies is not None:
         forces = generalised_forces(problem.floating_bodies.motions, load_as_force.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
@@ -174,7 +175,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         largest_force=max(state.largest_force, largest(load_as_force.force)),
     )  # fmt: skip
     if problem.extrapolates:
-        # For nonlinear bodies, the motions of rigid obstacles determine the extrapolation as well as the loads. The state at
+        # For nonlinear bodies, both the loads and the motions of rigid obstacles determine the extrapolation. The state at
         # rest is the first of the extrapolated states.
         quantities = [load.lift, load_as_force.force, *(() if problem.bodies is None else load.obstacles.values())]
         extrapolation = state.extrapolation
@@ -190,7 +191,7 @@ def _contact_at_end(
     """Return the state `end` with the contact data that later steps need, and the results of each contact pair.
 
     In 3D, the point of first contact is constant after the bodies have touched. Before that it is the node with the smallest
-    gap at the current positions of obstacles and clearances.
+    gap for the current obstacle positions and clearances.
 
     Parameters
     ----------
@@ -266,7 +267,7 @@ def _contact_at_end(
 
 def recover(
     problem: Problem, end: State, contact: dict[str, ContactResult], reaction: Array, iterations: dict[str, Any],
-    instant: tuple[int, float], bodies: DeformedBodies | None = None,
+    number_and_instant: tuple[int, float], bodies: DeformedBodies | None = None,
 ) -> StepResult:  # fmt: skip
     """Return the result of a load step.
 
@@ -281,7 +282,7 @@ def recover(
         Reactions [force].
     iterations : dict
         Numbers of iterations, see `StepResult`.
-    instant : (int, float)
+    number_and_instant : (int, float)
         Number of the step, and pseudo-time at its end.
     bodies : DeformedBodies, optional
         The nonlinear bodies at the end of the step; None if bodies are linear.
@@ -294,13 +295,13 @@ def recover(
         "pressure": [load for load in loads if isinstance(load, Pressure)],
         "spin": [load for load in loads if isinstance(load, Centrifugal)],
     }  # fmt: skip
-    factors = {name: problem.factors(parts, instant[1]) for name, parts in histories.items()}
+    factors = {name: problem.factors(parts, end.instant) for name, parts in histories.items()}
     iterations |= {f"{name}_factors": values for name, values in factors.items() if values}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     if points := problem.reference_points:
         iterations["reference_reactions"] = reference_reactions(problem.model, points, reaction, u)
     if sections:
-        iterations["pretension"] = section_results(sections, u, reaction, problem.factors(sections, instant[1]))
+        iterations["pretension"] = section_results(sections, u, reaction, problem.factors(sections, end.instant))
     if bodies is not None:
         stress = recovery.nodal_average(mesh, bodies.stress, problem.sides)
     else:
@@ -315,7 +316,7 @@ def recover(
         stress, by_material = nodal_stress_of_materials(problem.sides, materials_of_cells, stress, mesh.n_points)
     equivalent, units = von_mises(stress), problem.model.units
     return StepResult(
-        *instant, u.copy(), stress, equivalent, von_mises_signed(stress, equivalent), reaction, contact,
+        *number_and_instant, u.copy(), stress, equivalent, von_mises_signed(stress, equivalent), reaction, contact,
         iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
         temperature=heat, units=units and units_of_results(units, problem.model.kinematics),

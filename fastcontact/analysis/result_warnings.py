@@ -56,7 +56,7 @@ NEGLECTED = 0.1
 # Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
 # bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.
 OUT_OF_BALANCE = 0.03
-# Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
+# Largest recommended factor by which to increase the number of steps. A larger factor indicates a wrong coefficient of wear.
 LARGEST_STEP_FACTOR = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `pressure_oscillation`. On other
 # facets the limit is ALTERNATING.
@@ -66,33 +66,40 @@ MIN_FACETS_ACROSS_RADIUS = 4
 # Relative residual of the displacement or of the forces above which a warning is given.
 NOTABLE_RESIDUAL = 1e-4
 # Sliding past periodic ends, relative to the length of facets, above which a warning is given. On a strip with friction 0.3
-# under a uniform pressure, pressures at the ends change by 0.03 times this share with dual multipliers and by 0.7 times it
-# with standard ones; in press fits with these, by 1.7 times.
+# under a uniform pressure, the relative changes of pressures at the ends are 0.03 times this ratio with dual multipliers and
+# 0.7 times with standard multipliers. In press fits they are 1.7 times this ratio with standard multipliers.
 SLIDE_PAST_ENDS, SLIDE_PAST_ENDS_DUAL = 0.01, 0.3
 # Smallest number of nodes for which the median is meaningful.
 MIN_NODES = 10
+# Number of the first step in which nothing determines the position of some bodies, the free motions of each of them by its
+# name, and their largest displacement in this step [length].
+FreeBodies = tuple[int, dict[str, list[str]], float]
 
 
 def result_warnings(
-    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]], float] | None,
-    peaks: Mapping[str, Peak],
-) -> list[str]:  # fmt: skip
-    """Return the warnings about an analysis whose `last` step ended in a state.
+    problem: Problem, state: State, last: StepResult, free_bodies: FreeBodies | None, peaks: Mapping[str, Peak]
+) -> list[str]:
+    """Return the warnings about an analysis whose `last` step ended in `state`.
 
-    `free` is the number of the first step in which nothing determines the position of bodies, their free motions, and their
-    largest displacement in this step; `peaks` are, for each pair, the number, displacements and contact results of the step
-    with its largest normal force.
+    Parameters
+    ----------
+    problem : Problem
+    state : State
+    last : StepResult
+    free_bodies : FreeBodies or None
+    peaks : dict of str to Peak
+        Number, displacements and contact results of the step in which the normal force of a pair is largest, by pair.
     """
     earlier = {peak[0]: peak for peak in peaks.values() if peak[0] != last.index}
     warnings = interpenetration(problem, last, list(earlier.values()))
-    warnings += [*_loaded_springs(problem, last), *_undetermined_positions(last, free)]
+    warnings += [*_loaded_springs(problem, last), *_undetermined_positions(last, free_bodies)]
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
     warnings += locking_warnings(problem, state, last)
     if reason := problem.solver.replacement_reason:
         warnings.append(f'{reason}. linear_solver="direct" factorises the matrix from the start')
     load = problem.load_at(last.load_factor)
-    rises = load.rise, state.rise  # prescribed for nonlinear bodies, and conducted
+    rises = load.rise, state.rise  # by prescribed temperatures of nonlinear bodies, and by heat conduction
     loaded = any(values is not None and values.any() for values in (load.force, load.lift, *rises))
     sag = sag_warnings(problem, state, last)
     clearances = _open_clearances(problem, state)
@@ -134,7 +141,7 @@ def _sliding_past_ends(pair: Formulation, contact: ContactResult) -> Iterator[st
         yield (
             f"contact '{contact.name}': its sides slide by {distance:.3g}, or {share:.1%} of a facet, past each other at the "
             "periodic ends, beyond which there are no opposite facets: pressures of the nodes at the ends may be wrong. "
-            "The default formulation is affected little; without sliding at the ends, or without ends, there is no error"
+            "The default formulation is little affected; without sliding at the ends, or without ends, there is no error"
         )
 
 
@@ -200,11 +207,11 @@ def _energy_imbalance(state: State) -> Iterator[str]:
 
 
 def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
-    """Yield a warning where nodes that close and slide in one step, or slide until contact is lost, do much of the work.
+    """Yield a warning if nodes that close and slide in one step, or slide until contact is lost, do much frictional work.
 
-    This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the largest energy.
-    Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps,
-    and 1e-5 if slip is measured from first contact.
+    Their work must also exceed NOTABLE squared times the largest energy, which is the energy of a relative error NOTABLE of
+    the displacement. Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy
+    in large steps, and 1e-5 if slip is measured from first contact.
     """
     work = state.work
     if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
@@ -284,10 +291,10 @@ def _loaded_springs(problem: Problem, last: StepResult) -> Iterator[str]:
         )
 
 
-def _undetermined_positions(last: StepResult, free: tuple[int, dict[str, list[str]], float] | None) -> Iterator[str]:
-    """Yield a warning about bodies whose position is undetermined in a step; for `free` see `result_warnings`."""
-    if free is not None:
-        index, bodies, moved = free
+def _undetermined_positions(last: StepResult, free_bodies: FreeBodies | None) -> Iterator[str]:
+    """Yield a warning about bodies whose position is undetermined in a step."""
+    if free_bodies is not None:
+        index, bodies, moved = free_bodies
         names = "; ".join(f"{body}: {', '.join(motions)}" for body, motions in bodies.items())
         when = "" if index == last.index else f" in load step {index}"
         lost = f". They lost contact in this step, moving by up to {moved:.3g}: smaller load steps may avoid this"
@@ -300,7 +307,7 @@ def _undetermined_positions(last: StepResult, free: tuple[int, dict[str, list[st
 
 def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     laws, field = [material for material, _ in problem.model.materials], problem.field
-    # Infinite for all but isotropic materials; the strains of the others are computed below.
+    # Infinite except for homogeneous `LinearElastic` materials. Where it is infinite, strains are computed below.
     moduli = (law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf for law in laws)
     shear = np.array([*moduli])
     strain, interface, interior = 0.0, last.material_stress, np.ones(len(last.stress), bool)
@@ -459,7 +466,7 @@ def facets_across_radius(side: Surface, closed: Mask, excluded: Mask) -> int | N
     ----------
     side : Surface
     closed, excluded : ndarray of bool (m,)
-        Nodes of the side in contact; nodes excluded by the user, which are no edge.
+        Nodes of the side in contact; nodes excluded by the user, which do not form an edge.
     """
     reached = ~closed & ~excluded
     if not reached.any():
@@ -480,15 +487,22 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
 
     Open nodes between closed ones count as closed with zero pressure: with wear, every second node may be open. The measure
     is the median of the differences from the mean of the neighbours, each divided by half the sum of the pressure and this
-    mean, which is not zero where only the neighbours are open. On rings of tri3 cells 4.6 times as deep as wide, it is
-    0.30, with pressure errors of 0.16 to 0.27; on wider ones 0.16 (0.09 to 0.13), on quadrangles 0.002; under punches of
-    hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12, and under a wearing hex8 sole 0.22. On quadratic
-    facets, the neighbours of corners are the other nodes and vice versa, see `_alternation_matrix`. On rings of quad8 and
-    tri6 cells it is 0.15 or more with pressure errors of 0.14 to 1, and less with errors of up to 0.2, or 0.4 where meshes
-    nearly match: errors then vary along the side, which the median does not show. On a stiff quad8 strip that bends on a
-    soft base with larger facets it is 0.13 with errors of 0.3, or 0.1 without a warning if the strip does not bend. Under
-    elastic punches of quad8 and tri6 cells whose facets are as large as the opposite ones it is 0.07 or less. On coarse
-    faces of hex20 under an elastic punch it is up to 0.18.
+    mean, which is not zero where only the neighbours are open. On quadratic facets, the neighbours of corners are the other
+    nodes and vice versa, see `_alternation_matrix`. Values of the measure are, on linear facets,
+
+    - 0.30 on rings of tri3 cells 4.6 times as deep as wide, with pressure errors of 0.16 to 0.27, 0.16 with wider cells and
+      errors of 0.09 to 0.13, and 0.002 with quadrangles;
+    - 0.10 to 0.12 under punches of hex8 and tet4 cells, whose pressures are singular at the edges;
+    - 0.22 under a hex8 block subject to wear;
+
+    and on quadratic facets,
+
+    - at least 0.15 on rings of quad8 and tri6 cells with pressure errors of 0.14 to 1, and less with errors of up to 0.2, or
+      up to 0.4 where meshes nearly match: errors then vary along the side, which the median does not show;
+    - 0.13 on a stiff quad8 strip that bends on a soft base with larger facets, with errors of 0.3, and 0.1, so that no
+      warning is given, if the strip does not bend;
+    - at most 0.07 under elastic punches of quad8 and tri6 cells whose facets are as large as the opposite ones;
+    - up to 0.18 on coarse faces of hex20 cells under an elastic punch.
 
     Sides that never separate or that adhere carry tension as well. Their mean may be zero or round-off and is not used.
     """
@@ -637,8 +651,8 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
         contact, friction = last.contact[name], pair.friction or 0.0
         sides = (contact.points, contact.force_vectors), (contact.primary_points, contact.primary_force_vectors)
         for points, force in sides if friction else ():
-            arm = np.maximum(np.linalg.norm(motion[points], axis=1), np.linalg.norm(rotation[points], axis=1))
-            friction_work = friction * np.linalg.norm(force, axis=1) * arm
+            distance = np.maximum(np.linalg.norm(motion[points], axis=1), np.linalg.norm(rotation[points], axis=1))
+            friction_work = friction * np.linalg.norm(force, axis=1) * distance
             work = np.maximum(friction_work, np.abs((force * motion[points]).sum(axis=1)))
             np.add.at(capacity, body[points], rotating[points] * work)
     return capacity
@@ -646,12 +660,14 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
 
 def _ratio(neglected: Array, work_by_body: Array) -> Array:
     """Return the ratio (n_bodies,) of the results of `_work_on_strains` [-]."""
-    # Bodies whose work on strains is round-off of that of other bodies are free of stress.
+    # Bodies whose work on strains is round-off relative to that of other bodies are free of stress.
     return np.abs(neglected) / np.maximum(work_by_body, max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY))
 
 
 def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = False) -> tuple[Array, Array]:
-    """Return the work of the stresses on neglected strains, and its absolute value on strains, both (n_bodies,) [energy].
+    """Return the work of stresses on neglected strains, and the integral of its absolute value on linear strains.
+
+    Both are arrays (n_bodies,) [energy].
 
     With `at_centres`, strains at the centres of cells are used, which is faster and underestimates those of bending.
     """
@@ -673,7 +689,7 @@ def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = Fals
                 radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
                 volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_u / radius
             rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
-            # The neglected strain is half the product of the transposed rotation, which is antisymmetric, with the rotation.
+            # The neglected strain is 0.5 W.T @ W = -0.5 W @ W, since the rotation W is antisymmetric.
             neglected_work = -0.5 * np.einsum("cqij,cqij->cq", tensor, rotation @ rotation)
             size, rotated = (np.linalg.norm(part, axis=(2, 3)) for part in (slope - rotation, rotation))
             neglected_work[size < SINGLE_PRECISION * rotated] = 0.0  # stresses of a rigid-body motion are round-off

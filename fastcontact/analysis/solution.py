@@ -12,9 +12,9 @@ Let ``(g, s) = free + F y`` be the gaps and slips at the end of the step for for
 step, the gaps are g0, the forces y0, and the slips zero. At a fraction p of the step, gaps and slips for forces y are
 ``free + (1 - p) * ((g0, 0) - free - F y0) + F y``.
 
-If normals are inclined, a constraint that closes has a tangential relative displacement that is not slip. The correction for
-closing the whole gap g0 is part of `free`. An increment that closes a fraction of g0 includes the same fraction of the
-correction.
+If the normal is inclined to the direction in which a gap closes, the closing motion has a tangential component that is not
+slip. The correction for closing the whole gap g0 is part of `free`. An increment that closes a fraction of g0 includes the
+same fraction of the correction.
 
 The last increment depends on the earlier ones only through their slips, which stay fixed while the geometry converges.
 """
@@ -119,7 +119,7 @@ class Forces:
 
 # Function that solves an increment, given gaps and slips (1 + k, m) [length] to be added, the constraints (m,) that may
 # close, those of them that are closed initially, and initial forces (1 + k, m) [force] or None.
-Increment = Callable[[Array, Mask, Mask, Array | None], Forces]
+IncrementSolver = Callable[[Array, Mask, Mask, Array | None], Forces]
 # Number of constraints that may close in one increment, relative to the number of closed ones. In 3D `in_increments`
 # admits more while few are closed.
 GROWTH = 1 / 32
@@ -270,7 +270,7 @@ class Solution:
 
 
 def in_increments(
-    lag: Array, closing: Array, y: Array, waiting: Mask, solve: Increment
+    lag: Array, closing: Array, y: Array, waiting: Mask, solve: IncrementSolver
 ) -> tuple[Forces, Array, tuple[Array, Array, Array, Array, Array, float]]:
     """Return the forces at the end of a load step that is solved in increments, which end where constraints close.
 
@@ -284,7 +284,7 @@ def in_increments(
         Normal and tangential forces at the beginning of the step [force].
     waiting : ndarray of bool (m,)
         Constraints that are open at the beginning of the step.
-    solve : Increment
+    solve : IncrementSolver
 
     Returns
     -------
@@ -308,7 +308,7 @@ def in_increments(
         return solve(remaining, ~waiting, closed, y if y.any() else None)
 
     def slip_after(increase: Array, gaps: Array) -> Array:
-        """Return the slips (k, m) after an `increase` (k, m), less the closing motion that the remaining `gaps` (m,) add."""
+        """Return the slips (k, m) after an `increase` (k, m), without the closing motion of the remaining `gaps` (m,)."""
         open_fraction = np.divide(np.maximum(gaps, 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
         return np.asarray(slip + increase - open_fraction * added)
 

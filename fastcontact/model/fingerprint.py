@@ -106,7 +106,7 @@ def _digest(value: Any, mesh: Mesh) -> str:
 
 
 def _update(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
-    """Add a value to a digest by the function `add`. A function is represented by its values at `points` (n, dim)."""
+    """Add a value to a digest with the function `add`. A function is represented by its values at `points` (n, dim)."""
     if isinstance(value, Mesh):
         value = [value.points, value.cells, value.cell_groups, value.point_groups]
     if isinstance(value, Varying):
@@ -133,7 +133,7 @@ def _update(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array)
 
 
 def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
-    """Add a dataclass by its fields, an obstacle also by its distances, and a function by its values."""
+    """Add the type of an object, the fields of a dataclass, the distances of an obstacle, and the values of a function."""
     add(type(value).__qualname__.encode())
     points = _points_of(value, mesh, points)
     is_material = isinstance(value, Material)

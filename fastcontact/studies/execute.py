@@ -219,7 +219,7 @@ class RecordingContext(SpawnContext):
 
 
 class Workers(ProcessPoolExecutor):
-    """A pool of processes that can be terminated during their work, and that end when this process ends."""
+    """A process pool whose workers can be terminated while they work. They end when this process ends."""
 
     def __init__(self, count: int) -> None:
         self.context = RecordingContext()

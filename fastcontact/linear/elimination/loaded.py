@@ -31,7 +31,7 @@ class LoadedIteration(Loaded):
     solver : object
         The solver. It must have an attribute ``columns``, the `InverseColumns` of K, and two methods, whose argument
         ``elimination`` is an `Elimination` or None: ``solution(f, elimination, guess, monitor, tolerance)`` returns u (n,)
-        [length], and ``multiplier(elimination, u, f)`` returns the multipliers (m,) of the equations [force].
+        [length], and ``multiplier(elimination, u, f)`` returns the multipliers (m,) of the constraints [force].
     f : ndarray (n,)
         Right-hand side [force].
     """
@@ -41,7 +41,7 @@ class LoadedIteration(Loaded):
 
     @functools.cached_property
     def _unconstrained(self) -> Array:
-        """Solution (n,) without equations [length]."""
+        """Solution (n,) without constraints [length]."""
         return np.asarray(self._solver.solution(self._f, None, None))
 
     def solve(
@@ -50,7 +50,7 @@ class LoadedIteration(Loaded):
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return the displacements and the multipliers, see `Loaded.solve`.
 
-        Equations that are linearly dependent or have a compliance are not eliminated. Instead, the Delassus operator is
+        Constraints that are linearly dependent or have a compliance are not eliminated. Instead, the Delassus operator is
         formed from columns of K^-1.
         """
         solver = self._solver

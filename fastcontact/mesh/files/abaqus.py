@@ -12,7 +12,7 @@ NUMBERS_PER_LINE = 8
 
 
 def check_readable(path: Path) -> None:
-    """Raise FileError for files of which meshio would silently drop points or misread sets."""
+    """Raise FileError if meshio would silently drop points of a file or misread its sets."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
