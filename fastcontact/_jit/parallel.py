@@ -19,9 +19,12 @@ from fastcontact.arrays import AnyArray
 Result = TypeVar("Result")
 Item = TypeVar("Item")
 Parameters = ParamSpec("Parameters")
-# Largest amount of work, counted in nodes, that a single thread completes sooner than several threads, since waking them
-# takes 0.03 ms; default number of nodes of a cell; and largest number of threads.
-SINGLE_THREAD_WORK, NODES_PER_CELL = 80_000, 4
+# Largest amount of work that a single thread completes sooner than several threads, since waking them takes 0.03 ms. Work is
+# counted in nodes; a node takes about ten nanoseconds.
+SINGLE_THREAD_WORK = 80_000
+# Default number of nodes of a cell.
+NODES_PER_CELL = 4
+# Largest number of threads.
 MAX_THREADS = 255
 
 
@@ -69,7 +72,7 @@ def _thread_controller() -> Any:
 def on_one_blas_thread(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Limit BLAS to one thread while a function runs.
 
-    More threads would only wait actively between the small calls of a contact iteration. Moreover, the number of threads
+    More threads would only busy-wait between the small calls of a contact iteration. Moreover, the number of threads
     would determine the order of summation, on which the round-off errors of results depend.
     """
 

@@ -14,12 +14,15 @@ from fastcontact.arrays import Array, Indices
 # Largest number of pairs of points for which all distances are computed.
 MAX_PAIRS = 250_000
 # Vector of at most unit length that is not parallel to an axis or a diagonal of a structured mesh. The projections of two
-# points onto this vector differ by at most the distance of the points.
-PROJECTION = np.array([0.46, 0.5718, 0.6789])
+# points onto this vector differ by at most the distance between the points.
+DIRECTION = np.array([0.46, 0.5718, 0.6789])
 
 
 def nearest(points: Array, positions: Array) -> tuple[Array, Indices]:
-    """Return the distance (n,) [length] and the row (n,) of the nearest of `points` (m, dim) to `positions` (n, dim)."""
+    """Return the nearest of `points` (m, dim) to each of `positions` (n, dim).
+
+    The result consists of the distances (n,) [length] and the rows (n,) of the nearest points.
+    """
     if len(points) * len(positions) <= MAX_PAIRS:
         squared = ((positions[:, None] - points) ** 2).sum(axis=2)
         rows = squared.argmin(axis=1)
@@ -32,7 +35,7 @@ def nearest(points: Array, positions: Array) -> tuple[Array, Indices]:
 
 def close_pairs(points: Array, max_distance: float) -> Indices:
     """Return the pairs of rows (k, 2) of `points` (n, dim) [length] whose distance is at most `max_distance` [length]."""
-    projection = points @ PROJECTION[: points.shape[1]]
+    projection = points @ DIRECTION[: points.shape[1]]
     order = np.argsort(projection)
     is_close = np.diff(projection[order]) <= max_distance
     if not is_close.any():
@@ -49,7 +52,7 @@ def pairs_within(points: Array, centres: Array, radii: Array) -> tuple[Indices, 
     The result consists of the rows (k,) of `points` (n, dim) and the rows (k,) of `centres` (m, dim) [length], in the order
     of the centres. `radii` (m,) are the radii [length].
     """
-    direction = PROJECTION[: points.shape[1]]
+    direction = DIRECTION[: points.shape[1]]
     point_projections, centre_projections = points @ direction, centres @ direction
     order = np.argsort(point_projections)
     first = np.searchsorted(point_projections[order], centre_projections - radii)
@@ -57,7 +60,8 @@ def pairs_within(points: Array, centres: Array, radii: Array) -> tuple[Indices, 
     if (end - first).sum() <= 8 * MAX_PAIRS:
         centre = np.repeat(np.arange(len(centres)), end - first)
         point = order[np.arange(len(centre)) + np.repeat(end - np.cumsum(end - first), end - first)]
-        for x, x_centre in zip(points.T, centres.T, strict=True):  # each coordinate excludes most of the other pairs
+        # Each coordinate excludes most of the pairs that are not close.
+        for x, x_centre in zip(points.T, centres.T, strict=True):
             is_close = np.abs(x[point] - x_centre[centre]) <= radii[centre]
             point, centre = point[is_close], centre[is_close]
         is_close = ((points[point] - centres[centre]) ** 2).sum(axis=1) <= radii[centre] ** 2

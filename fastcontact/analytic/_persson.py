@@ -47,7 +47,7 @@ class PerssonPin:
     def pressure(self, angle: ArrayLike) -> Array:
         """Return the contact pressure (...) [pressure] at angles `angle` (...) [degrees] from the middle, zero outside.
 
-        The formula is given by Persson (1964) and by Ciavarella and Decuzzi (2001) for bodies of equal materials.
+        The formula is given by Persson (1964) and by Ciavarella and Decuzzi (2001) for bodies of the same material.
         """
         b = _half_tangent(self.contact_angle)
         y = np.tan(0.5 * np.radians(array("angle", angle)))
@@ -65,7 +65,7 @@ def _half_tangent(angle: float) -> float:
 def _clearance_ratio(angle: float) -> float:
     """Return E dR/Q for a contact angle, with the clearance dR and the force per unit length Q (Persson 1964).
 
-    The integrand is periodic, so that the midpoint rule converges exponentially.
+    The integrand is periodic. The midpoint rule therefore converges exponentially.
     """
     b = _half_tangent(angle)
     theta = (np.arange(256) + 0.5) * math.pi / 256 - 0.5 * math.pi
@@ -75,7 +75,7 @@ def _clearance_ratio(angle: float) -> float:
 
 
 def persson_limit_angle() -> float:
-    """Return half the contact angle of a pin without clearance, which does not depend on the force.
+    """Return the contact angle of a pin without clearance, which does not depend on the force.
 
     Returns
     -------
@@ -114,7 +114,8 @@ def persson_pin(
     clearance : float
         Radius of the hole minus the radius of the pin [length], at least 0.
     force, contact_angle : float
-        Force per unit length [force/length], or half the contact angle [degrees]; give exactly one of them.
+        Force per unit length [force/length], or angle between the middle and the end of the contact [degrees]; give exactly
+        one of them.
     kinematics : {"plane_stress", "plane_strain"}
         Kinematics of both bodies.
 
@@ -151,7 +152,8 @@ def persson_pin(
     if clearance == 0.0:
         return PerssonPin(R, clearance, value, limit)
     ratio = modulus * clearance / value
-    # The angle of Hertzian line contact exceeds the root. Half of this angle, at most half of `limit`, is a lower bound.
+    # The angle of Hertzian line contact is larger than the solution. The smaller of half this angle and half of `limit` is
+    # a lower bound.
     start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * ratio))))
     angle = brentq(lambda a: math.log(max(_clearance_ratio(a), 1e-300) / ratio), start, limit - 1e-12, xtol=1e-13)
     return PerssonPin(R, clearance, value, float(angle))

@@ -44,25 +44,25 @@ def _lines(path: Path) -> list[str]:
     from fastcontact.cases.summary import count
 
     case = read_case(path)
-    n_solids = sum(map(len, case.mesh.solids.values()))
+    n_cells = sum(map(len, case.mesh.solids.values()))
     kinematics = case.model.kinematics.replace("_", " ")
     return [
         f"{case.name}: {case.title}",
-        f"    {kinematics}, {n_solids} {', '.join(case.mesh.solids)}, {count(len(case.ramp), 'load step')}",
+        f"    {kinematics}, {n_cells} {', '.join(case.mesh.solids)}, {count(len(case.ramp), 'load step')}",
         *(f"    checks {check.description()}" for check in case.checks),
     ]
 
 
-def copy_case(case: Path, target: Path) -> list[Path]:
+def copy_case(case_path: Path, target: Path) -> list[Path]:
     """Copy a case file and its mesh file, if it has one, and return the new paths. Raises FileError if a path exists."""
     from fastcontact._tools.paths import replacing
 
-    text = case.read_text(encoding="utf-8")
-    mesh: dict[str, Any] = tomllib.loads(text).get("mesh", {})
+    text = case_path.read_text(encoding="utf-8")
+    mesh_table: dict[str, Any] = tomllib.loads(text).get("mesh", {})
     files = {target: text.encode()}
-    if "file" in mesh:
-        source = case.parent / mesh["file"]
-        files = {target: text.replace(f'"{mesh["file"]}"', f'"{source.name}"').encode()}
+    if "file" in mesh_table:
+        source = case_path.parent / mesh_table["file"]
+        files = {target: text.replace(f'"{mesh_table["file"]}"', f'"{source.name}"').encode()}
         files[target.parent / source.name] = source.read_bytes()
     for path in files:
         if path.exists():

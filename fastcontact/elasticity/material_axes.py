@@ -152,7 +152,7 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
 
 
 def rotations(frame: Array) -> Array:
-    """Return the matrices (n, 6, 6) [-] that transform stresses from the axes `frame` (n, 3, 3) [-] to the mesh axes.
+    """Return the matrices (n, 6, 6) [-] that transform stresses from the axes `frame` (n, 3, 3) [-] to the global axes.
 
     The components are xx, yy, zz, xy, yz, xz.
     """

@@ -28,7 +28,7 @@ from fastcontact.model.rigid_motions import FreeMotions, cone_rows, free_motions
 
 # Types of items that may act in only some of the load steps.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
-# Public methods and attributes of a model other than `add_...`; `dir` hides the others, which the analysis uses.
+# Public methods and attributes of a model besides `add_...`. `dir` lists only these; the analysis uses further ones.
 PUBLIC = (
     "check", "contact", "couple", "describe", "fix", "fix_temperature", "internal_forces", "kinematics", "loads", "materials",
     "mesh", "prescribe", "relate", "relate_groups", "strain", "supports", "units",
@@ -55,7 +55,7 @@ class Model(ModelSupports, metaclass=_PublicNames):
 
     Prescribed values are numbers, or functions from reference positions (n, dim) [length] to numbers (n,). They are
     multiplied by a history, a piecewise linear function of the load factor. The parameter `ramp` of many methods gives
-    an item a separate history, as pairs (load factor, multiplier) or as a `Ramp`, of which only the table is used. By
+    an item a separate history, as pairs (load factor, multiplier) or as a `Ramp`, whose load steps are ignored. By
     default all items have the history of the analysis, see `solve`. Normals and areas refer to the reference
     configuration unless stated otherwise.
 
@@ -68,10 +68,10 @@ class Model(ModelSupports, metaclass=_PublicNames):
     case_text : str
         Text that result files store, usually the case file.
     strain : {"small", "finite"}
-        If ``"finite"``, strains and rotations may be large (total Lagrangian formulation). The materials are then
-        hyperelastic ones such as `NeoHookean`, `ElasticPlastic`, and `LinearElastic`, which is interpreted as the Saint
-        Venant-Kirchhoff law for small strains and large rotations. Pressures follow the deformed surface; other loads keep
-        their directions and reference areas. Stresses are Cauchy stresses.
+        If ``"finite"``, strains and rotations may be large (total Lagrangian formulation). Admissible materials
+        are then hyperelastic ones such as `NeoHookean`, the elastic-plastic `ElasticPlastic`, and `LinearElastic`, which is
+        interpreted as the Saint Venant-Kirchhoff law for small strains and large rotations. Pressures follow the deformed
+        surface; other loads keep their directions and reference areas. Stresses are Cauchy stresses.
     reference_temperature : float
         Initial temperature of the bodies, at which the thermal strain is zero, unless `add_temperature` specifies
         another one [temperature].
@@ -150,7 +150,7 @@ class Model(ModelSupports, metaclass=_PublicNames):
         if self.initial_states:
             self.refuse_nonlinear("initial stresses and strains are")
         fixed, prescribed = self.prescribed_by_ramp()
-        self._log_axis()
+        self._log_axis_nodes()
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
         self._check_each_temporary_set(self._check_heat_of)
@@ -210,22 +210,22 @@ class Model(ModelSupports, metaclass=_PublicNames):
             return
         motion = ConstrainedMotion(fixed.ravel(), relations)
         for instant in ramp.instants:
-            lift = combined(prescribed, ramp, instant, fixed.shape)
-            motion.lift(lift.ravel(), [multiplier(r.ramp, ramp, instant) for r in relations])
+            displacement = combined(prescribed, ramp, instant, fixed.shape)
+            motion.lift(displacement.ravel(), [multiplier(r.ramp, ramp, instant) for r in relations])
 
     def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
         """Raise ModelError if a rigid-body motion is possible.
 
         Supports, constraints and springs prevent rigid-body motions. Contact prevents motions that close a gap. A motion
-        that opens a gap is also accepted if a load does work on it, since this load may press the body against the contact.
+        that opens a gap is also accepted if a load does work in it, since this load may press the body against the contact.
         """
         motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.constraint_rows()))
         if not len(motions):
             return
-        works = [generalised_forces(motions, force.ravel()) for force in forces]
+        work = [generalised_forces(motions, force.ravel()) for force in forces]
         # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
         gaps = gap_changes(self, motions, rigid_motions.LARGEST_FRICTION_FACTOR)
-        check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(works, (-1, len(motions))))))
+        check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(work, (-1, len(motions))))))
 
 
 def gap_changes(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:

@@ -128,7 +128,7 @@ def _equal_force_sentences(series: Series) -> Iterator[str]:
 TABLE_QUANTITIES = ("force", "pressure_max", "contact_radius", "von_mises_max")
 # Columns of the tables of limits.
 LIMIT_COLUMNS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
-# Mark after the error bar of a limit to which the values do not converge.
+# Mark after the error bar of a limit if the values do not converge.
 NOT_CONVERGED = " (unsettled)"
 
 
@@ -169,7 +169,7 @@ def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], uni
 
 
 def _limit_entries(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
-    """Return the entries of some columns of limits for a quantity; dashes if it has no limit."""
+    """Return the entries of a quantity in given columns of a table of limits, or dashes if it has no limit."""
     limit, split = series.limits.get(quantity), series.split(quantity)
     if limit is None:
         return ["-"] * len(columns)
@@ -222,7 +222,10 @@ def series_dict(series: Series) -> dict[str, Any]:
 
 
 def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
-    """Return the fields of `values` called `names`, by key. NaN, and all fields of None, are replaced by None."""
+    """Return a dictionary from the keys of `names` to the fields of `values` of these names.
+
+    NaN is replaced by None. If `values` is None, all entries are None.
+    """
     fields = {key: getattr(values, name, None) for key, name in names.items()}
     return {key: finite_or_none(value) if isinstance(value, float) else value for key, value in fields.items()}
 
@@ -230,9 +233,9 @@ def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
 def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
     """Return limit, order, theory and errors of a quantity, with None for missing numbers."""
     limit, split, reference = series.limits.get(name), series.split(name), series.reference.get(name)
-    same = {key: key for key in ("uncertainty", "order", "order_uncertainty", "converging")}
+    own_names = {key: key for key in ("uncertainty", "order", "order_uncertainty", "converging")}
     entry: dict[str, Any] = {
-        **_fields(limit, limit="value", **same),
+        **_fields(limit, limit="value", **own_names),
         "converges_to_theory": series.converges_to_theory(name),
         "theory": series.theory.get(name),
         **_fields(
@@ -252,7 +255,7 @@ MOST_CURVES_WITH_BARS = 3
 
 
 def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Mapping[str, str]) -> None:
-    """Draw the mesh error of a quantity over h with logarithmic axes, error bars, fits and slope triangles."""
+    """Draw the mesh error of a quantity against h with logarithmic axes, error bars, fits and slope triangles."""
     fitted = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not fitted:
         return message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
@@ -304,7 +307,7 @@ def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> No
 
 
 def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]) -> None:
-    """Draw the contact pressure of all levels and of the theory over the distance from the middle of the contact."""
+    """Draw the contact pressure of all levels and of the theory against the distance from the middle of the contact."""
     if not series.finest.profile:
         return message(ax, "this case has no contact pair,\nso there is no contact pressure")
     from matplotlib import colormaps
@@ -342,7 +345,7 @@ def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
 
 
 def draw_differences(ax: Any, all_series: Sequence[Series], best: Series, units: Mapping[str, str]) -> None:
-    """Draw the difference of the largest pressure from theory over h, which tends to the model error."""
+    """Draw the difference of the largest pressure from theory against h, which tends to the model error."""
     quantity = "pressure_max"
     compared = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
     if not compared:
@@ -378,7 +381,7 @@ class Study(Report):
     series : list of Series
         Results of each combination of element and contact formulation that was solved.
     failed : dict of str to str
-        Reason of the failure of each combination that could not be solved, by its name.
+        Reason for the failure of each combination that could not be solved. The keys are the names of the combinations.
     theory : object or None
         Theory at equal approach, an object of `fastcontact.analytic`; None if the case has none.
     """
@@ -401,9 +404,9 @@ class Study(Report):
 
     @property
     def best(self) -> Series:
-        """Results of the combination with the highest rank among those that were solved on the most levels."""
-        complete = max(len(series.levels) for series in self.series)
-        candidates = [series for series in self.series if len(series.levels) == complete]
+        """Results of the combination of highest expected accuracy among those that were solved on the most levels."""
+        n_levels = max(len(series.levels) for series in self.series)
+        candidates = [series for series in self.series if len(series.levels) == n_levels]
         return max(candidates, key=lambda series: series.combination.rank)
 
     def as_dict(self) -> dict[str, Any]:

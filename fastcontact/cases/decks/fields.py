@@ -30,7 +30,7 @@ def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[in
 
 
 def temperature_of(assembly: Assembly, row: Row) -> tuple[list[int], float, Location]:
-    """Return the points of a line with a temperature, the temperature and the location."""
+    """Return the points, the temperature and the location of a data line."""
     if any(row.entries[2:]):
         raise row.error("temperature gradients exist in beams and shells only: give a single temperature")
     value = row.number(1)

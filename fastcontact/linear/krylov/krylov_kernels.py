@@ -14,7 +14,7 @@ WORK_PER_ENTRY = 0.5
 
 
 @kernel
-def stretch_dot(a, b, low, high):
+def range_dot(a, b, low, high):
     """Return the dot product of the entries `low` to ``high - 1``, computed as four independent partial sums."""
     s0 = s1 = s2 = s3 = 0.0
     unrolled_end = low + (high - low) // 4 * 4
@@ -30,7 +30,7 @@ def stretch_dot(a, b, low, high):
 
 @kernel
 def total(sums):
-    """Return the total of the `sums` of the chunks, which are added in ascending order."""
+    """Return the total of the `sums` of the chunks, which are added in the order of the chunks."""
     result = 0.0
     for k in range(sums.shape[0]):
         result += sums[k]
@@ -42,7 +42,7 @@ def dot(low, high, a, b, sums):
     """Fill `sums` (ceil(n / CHUNK),) with the dot products of the chunks of `a` and `b` (n,)."""
     n = a.shape[0]
     for c in range(low, high):
-        sums[c] = stretch_dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
+        sums[c] = range_dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
 
 
 @kernel
@@ -54,7 +54,7 @@ def advance(low, high, alpha, p, q, x, r, sums):
         for i in range(begin, end):
             x[i] += alpha * p[i]
             r[i] -= alpha * q[i]
-        sums[c] = stretch_dot(r, r, begin, end)
+        sums[c] = range_dot(r, r, begin, end)
 
 
 @kernel

@@ -252,7 +252,7 @@ class ModelSupports(ModelContact):
         """Nodes (k,) on the axis of an axisymmetric model, where x is fixed without a support; empty for other models."""
         return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 
-    def _log_axis(self) -> None:
+    def _log_axis_nodes(self) -> None:
         """Log the nodes whose radial displacement is fixed only by the axial symmetry, and not by a support."""
         supported = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
         nodes = np.setdiff1d(self.axis_nodes, np.concatenate(supported)) if supported else self.axis_nodes
