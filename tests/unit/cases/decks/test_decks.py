@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from commands import output_of
-from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of
+from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of, static_steps
 from pairwise import first_of
 from refusals import refused
 
@@ -139,29 +139,13 @@ def test_plastic_tables_and_kinematic_hardening(tmp_path):
 
 
 def test_loads_ramp_from_step_to_step_and_stay_or_go(tmp_path):
-    steps = """*Step
-*Static
-*Dsload
-roof, P, 100.
-*End Step
-*Step
-*Static
-*Cload
-top, 3, -5.
-*End Step
-*Step
-*Static
-*Dsload, op=NEW
-*End Step
-*Step
-*Static
-*Cload
-15, 3, -25.
-*Dsload
-roof, P, 60.
-*End Step
-"""
-    deck = deck_of(tmp_path, WHOLE.replace(STEP, steps))
+    loads = (
+        "*Dsload\nroof, P, 100.\n",
+        "*Cload\ntop, 3, -5.\n",
+        "*Dsload, op=NEW\n",
+        "*Cload\n15, 3, -25.\n*Dsload\nroof, P, 60.\n",
+    )
+    deck = deck_of(tmp_path, WHOLE.replace(STEP, static_steps(*loads)))
     found = deck.solve()
     assert [step.load_factor for step in found] == [1.0, 2.0, 3.0, 4.0]
     forces = [step.contact["ss/sm"].force[2] for step in found]
@@ -169,22 +153,9 @@ roof, P, 60.
 
 
 def test_prescribed_displacements_go_from_value_to_value(tmp_path):
-    steps = """*Amplitude, name=wave
-0., 0., 0.5, 2., 1., 1.
-*Step
-*Static
-*Boundary
-top, 3, 3, -0.002
-*End Step
-*Step
-*Static
-*Boundary, op=NEW, amplitude=wave
-bottom, 3
-x0, 1
-y0, 2
-top, 3, 3, -0.001
-*End Step
-"""
+    wave = "*Amplitude, name=wave\n0., 0., 0.5, 2., 1., 1.\n"
+    again = SUPPORTS.replace("*Boundary", "*Boundary, op=NEW, amplitude=wave") + "top, 3, 3, -0.001\n"
+    steps = wave + static_steps("*Boundary\ntop, 3, 3, -0.002\n", again)
     deck = deck_of(tmp_path, WHOLE.replace(STEP, steps))
     found = {step.load_factor: step.displacement[deck.point(17), 2] for step in deck.solve()}
     assert found == pytest.approx({1.0: -0.002, 1.5: -0.002, 2.0: -0.001}, rel=1e-9)
