@@ -22,6 +22,35 @@ CUBE = f"""*Node
 """
 HELD = "1, 1, 3\n2, 2, 3\n3, 3\n4, 1\n4, 3\n5, 1\n8, 1\n"
 
+# Two squares side by side, pulled at one corner.
+FLAT = """*Node
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+5, 2., 0.
+6, 2., 1.
+*Element, type=CPE4, elset=one
+1, 1, 2, 3, 4
+*Element, type=CPE4, elset=two
+2, 2, 5, 6, 3
+*Material, name=steel
+*Elastic
+1000., 0.3
+*Solid Section, elset=one, material=steel
+1.
+*Solid Section, elset=two, material=steel
+1.
+*Boundary
+1, 1, 2
+4, 1
+*Step
+*Static
+*Cload
+5, 1, 1.
+*End Step
+"""
+
 
 def pressed(lines, pressure=100.0):
     """Return a step of a deck that presses on the cube."""

@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from case_texts import square
 
 import fastcontact as fc
 from fastcontact.mesh.files.med import write_med_mesh
@@ -15,71 +16,33 @@ DATA = Path(__file__).resolve().parents[2] / "data"
 
 # Formats by what reads them; the meshes of meshio go by their suffix, with a mark for the kind of the file.
 MESHIO = {
-    "gmsh22.msh": {"file_format": "gmsh22", "binary": False},
-    "gmsh22-binary.msh": {"file_format": "gmsh22", "binary": True},
-    "gmsh40.msh": {"file_format": "gmsh40", "binary": False},
-    "gmsh40-binary.msh": {"file_format": "gmsh40", "binary": True},
     "gmsh41.msh": {"file_format": "gmsh", "binary": False},
     "gmsh41-binary.msh": {"file_format": "gmsh", "binary": True},
-    "vtk42.vtk": {"file_format": "vtk42", "binary": False},
-    "vtk42-binary.vtk": {"file_format": "vtk42", "binary": True},
-    "vtk51.vtk": {"file_format": "vtk51", "binary": False},
-    "vtk51-binary.vtk": {"file_format": "vtk51", "binary": True},
     "ascii.vtu": {"file_format": "vtu", "binary": False},
     "binary.vtu": {"file_format": "vtu", "binary": True, "compression": None},
     "zlib.vtu": {"file_format": "vtu", "binary": True, "compression": "zlib"},
     "lzma.vtu": {"file_format": "vtu", "binary": True, "compression": "lzma"},
     "xml.xdmf": {"file_format": "xdmf", "data_format": "XML"},
     "hdf.xdmf": {"file_format": "xdmf", "data_format": "HDF"},
-    "abaqus.inp": {"file_format": "abaqus"},
-    "medit.mesh": {"file_format": "medit"},
-    "medit.meshb": {"file_format": "medit"},
-    "nastran.bdf": {"file_format": "nastran"},
-    "flac3d.f3grid": {"file_format": "flac3d"},
-    "mdpa.mdpa": {"file_format": "mdpa"},
-    "avsucd.avs": {"file_format": "avsucd"},
-    "permas.post": {"file_format": "permas"},
-    "tecplot.dat": {"file_format": "tecplot"},
-    "ugrid.ugrid": {"file_format": "ugrid"},
-    "netgen.vol": {"file_format": "netgen"},
-    "netgen.vol.gz": {"file_format": "netgen"},
-    "h5m.h5m": {"file_format": "h5m"},
-    "hmf.hmf": {"file_format": "hmf"},
-    "cgns.cgns": {"file_format": "cgns"},
-    "su2.su2": {"file_format": "su2"},
     "dolfin.xml": {"file_format": "dolfin-xml"},
-    "tetgen.node": {"file_format": "tetgen"},
-    "obj.obj": {"file_format": "obj"},
-    "off.off": {"file_format": "off"},
-    "ply.ply": {"file_format": "ply", "binary": False},
-    "ply-binary.ply": {"file_format": "ply", "binary": True},
-    "stl.stl": {"file_format": "stl", "binary": False},
-    "stl-binary.stl": {"file_format": "stl", "binary": True},
-    "wkt.wkt": {"file_format": "wkt"},
 }
+for file in ("gmsh22.msh", "gmsh40.msh", "vtk42.vtk", "vtk51.vtk", "ply.ply", "stl.stl"):  # in text and binary
+    kind, _, suffix = file.partition(".")
+    MESHIO[file] = {"file_format": kind, "binary": False}
+    MESHIO[f"{kind}-binary.{suffix}"] = {"file_format": kind, "binary": True}
+NAMED_BY_FORMAT = (
+    "abaqus.inp", "medit.mesh", "medit.meshb", "nastran.bdf", "flac3d.f3grid", "mdpa.mdpa", "avsucd.avs", "permas.post",
+    "tecplot.dat", "ugrid.ugrid", "netgen.vol", "netgen.vol.gz", "h5m.h5m", "hmf.hmf", "cgns.cgns", "su2.su2",
+    "tetgen.node", "obj.obj", "off.off", "wkt.wkt",
+)  # fmt: skip
+MESHIO |= {file: {"file_format": file.partition(".")[0]} for file in NAMED_BY_FORMAT}
 
 
 # Two cubes, one pressed and dragged over the other, with most of what decks may hold.
-DECK = """*Heading
+DECK = f"""*Heading
  two cubes
 *Node
-1, 0., 0., 0.
-2, 1., 0., 0.
-3, 1., 1., 0.
-4, 0., 1., 0.
-5, 0., 0., 1.
-6, 1., 0., 1.
-7, 1., 1., 1.
-8, 0., 1., 1.
-11, 0., 0., 1.
-12, 1., 0., 1.
-13, 1., 1., 1.
-14, 0., 1., 1.
-15, 0., 0., 2.
-16, 1., 0., 2.
-17, 1., 1., 2.
-18, 0., 1., 2.
-*Element, type=C3D8, elset=low
+{square(1, 0)}{square(5, 1)}{square(11, 1)}{square(15, 2)}*Element, type=C3D8, elset=low
 1, 1, 2, 3, 4, 5, 6, 7, 8
 *Element, type=C3D8, elset=up
 2, 11, 12, 13, 14,

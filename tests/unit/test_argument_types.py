@@ -175,46 +175,38 @@ def test_imaginary_parts_are_not_lost_without_a_word(what):
 
 
 @pytest.mark.parametrize(
-    ("call", "message"),
+    ("method", "given", "placed", "named"),
     [
-        (
-            lambda model: model.add_contact("pair", "TOP", "BOTTOM"),
-            "Model.add_contact takes name by position and all other arguments by keyword: write secondary=..., primary=...",
-        ),
-        (
-            lambda model: model.add_pressure("TOP", 1.0, [(0.0, 1.0)]),
-            "Model.add_pressure takes group, value by position and all other arguments by keyword: write ramp=...",
-        ),
-        (
-            lambda model: model.add_contact("pair", secondary="TOP"),
-            "Model.add_contact() missing 1 required keyword-only argument: 'primary'",
-        ),
-        (
-            lambda model: model.add_contact("pair", slave="TOP", master="BOTTOM"),
-            "Model.add_contact() missing 2 required keyword-only arguments: 'secondary' and 'primary': write secondary "
-            "instead of slave and primary instead of master",
-        ),
-        (
-            lambda model: model.add_force("TOP", -1.0),
-            "Model.add_force takes group by position and all other arguments by keyword: write x=..., y=...",
-        ),
-        (
-            lambda model: model.add_moment("TOP", 3.0),
-            "Model.add_moment takes group by position and all other arguments by keyword: write z=...",
-        ),
-        (
-            lambda model: model.fix("TOP", "x", "y"),
-            "Model.fix takes group, components by position and all other arguments by keyword: write axes=...",
-        ),
-        (
-            lambda model: model.add_initial_stress("TOP", 1.0),
-            "Model.add_initial_stress takes groups by position and all other arguments by keyword: write xx=..., yy=...",
-        ),
-        (lambda model: model.fix("TOP"), "Model.fix() missing 1 required positional argument: 'components'"),
+        ("add_contact", ("pair", "TOP", "BOTTOM"), "name", "secondary=..., primary=..."),
+        ("add_pressure", ("TOP", 1.0, [(0.0, 1.0)]), "group, value", "ramp=..."),
+        ("add_force", ("TOP", -1.0), "group", "x=..., y=..."),
+        ("add_moment", ("TOP", 3.0), "group", "z=..."),
+        ("fix", ("TOP", "x", "y"), "group, components", "axes=..."),
+        ("add_initial_stress", ("TOP", 1.0), "groups", "xx=..., yy=..."),
     ],
 )
-def test_misplaced_and_missing_arguments_are_named(call, message):
-    model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+def test_misplaced_arguments_are_named(method, given, placed, named):
+    rule = f"takes {placed} by position and all other arguments by keyword: write {named}"
     with pytest.raises(TypeError) as caught:
-        call(model)
-    assert str(caught.value) == message
+        getattr(fc.Model(fc.generate.block(), kinematics="plane_strain"), method)(*given)
+    assert str(caught.value) == f"Model.{method} {rule}"
+
+
+@pytest.mark.parametrize(
+    ("method", "given", "options", "lacking"),
+    [
+        ("add_contact", ("pair",), {"secondary": "TOP"}, "1 required keyword-only argument: 'primary'"),
+        (
+            "add_contact",
+            ("pair",),
+            {"slave": "TOP", "master": "BOTTOM"},
+            "2 required keyword-only arguments: 'secondary' and 'primary': write secondary instead of slave and primary "
+            "instead of master",
+        ),
+        ("fix", ("TOP",), {}, "1 required positional argument: 'components'"),
+    ],
+)
+def test_missing_arguments_are_named(method, given, options, lacking):
+    with pytest.raises(TypeError) as caught:
+        getattr(fc.Model(fc.generate.block(), kinematics="plane_strain"), method)(*given, **options)
+    assert str(caught.value) == f"Model.{method}() missing {lacking}"

@@ -424,18 +424,15 @@ def result(tmp_path_factory):
     return folder / "ball.vtkhdf"
 
 
-@pytest.mark.parametrize(
-    "options",
-    first_of(
-        1,
-        [
-            ["--map"],
-            ["--section", "z=0", "--field", "stress.yy", "--zoom", "8"],
-            ["--field", "displacement.y", "--scale", "10"],
-            ["--history"],
-        ],
-    ),
-)
+DRAWINGS = [
+    ["--map"],
+    ["--section", "z=0", "--field", "stress.yy", "--zoom", "8"],
+    ["--field", "displacement.y", "--scale", "10"],
+    ["--history"],
+]
+
+
+@pytest.mark.parametrize("options", first_of(1, DRAWINGS))
 def test_the_command_draws_solids(result, tmp_path, options):
     from matplotlib.image import imread
 

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from case_texts import FLAT
 from models import elastic_model
 from refusals import refused
 
@@ -26,27 +27,6 @@ DATA = {
     },
     "ramp": {"steps": 1},
 }
-DECK = """
-*NODE
-1, 0., 0.
-2, 1., 0.
-3, 1., 1.
-4, 0., 1.
-*ELEMENT, TYPE=CPE4, ELSET=ALL
-1, 1, 2, 3, 4
-*MATERIAL, NAME=M
-*ELASTIC
-1000., 0.3
-*SOLID SECTION, ELSET=ALL, MATERIAL=M
-*BOUNDARY
-1, 1, 2
-2, 2
-*STEP
-*STATIC
-*CLOAD
-3, 2, 1.
-*END STEP
-"""
 
 
 def test_a_case_of_data_can_be_studied():
@@ -78,7 +58,7 @@ def read_again(text):
     ],
 )
 def test_what_is_no_case_file_is_refused(study, tmp_path):
-    (tmp_path / "plate.inp").write_text(DECK)
+    (tmp_path / "plate.inp").write_text(FLAT)
     with pytest.raises(
         fc.CaseError, match="'plate' is an input deck: studies change the mesh and the values of a case file"
     ):

@@ -4,6 +4,12 @@ from case_texts import square
 
 import fastcontact as fc
 
+
+def static_steps(*lines):
+    """Return the steps of a deck, one for each of the given texts."""
+    return "".join(f"*Step\n*Static\n{own}*End Step\n" for own in lines)
+
+
 NODES = f"""*Heading
  two cubes
 *Node
@@ -41,12 +47,7 @@ bottom, 3
 x0, 1
 y0, 2
 """
-STEP = """*Step
-*Static
-*Dsload
-roof, P, 100.
-*End Step
-"""
+STEP = static_steps("*Dsload\nroof, P, 100.\n")
 WHOLE = NODES + MATERIAL + CONTACT + SUPPORTS + STEP
 
 

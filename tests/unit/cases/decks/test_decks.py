@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from commands import output_of
-from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of
+from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of, static_steps
 from pairwise import first_of
 from refusals import refused
 
@@ -97,18 +97,15 @@ def test_nlgeom_with_kinematic_hardening_warns_and_tells_the_strain_found(tmp_pa
         deck.solve()
 
 
-@pytest.mark.parametrize(
-    ("keyword", "law"),
-    first_of(
-        2,
-        [
-            ("*Hyperelastic, neo hooke\n0.5, 0.2\n", fc.NeoHookean(E=90.0 / 31.0, nu=28.0 / 62.0)),
-            ("*Hyperelastic, mooney-rivlin\n0.4, 0.1, 0.2\n", fc.MooneyRivlin(0.4, 0.1, bulk=10.0)),
-            ("*Hyperelastic, yeoh\n0.5, -0.1, 0.01, 0.2\n", fc.Yeoh(0.5, -0.1, 0.01, bulk=10.0)),
-            ("*Hyperelastic, ogden, n=2\n0.8, 2., 0.2, -1., 0.2\n", fc.Ogden([0.8, 0.2], [2.0, -1.0], bulk=10.0)),
-        ],
-    ),
-)
+RUBBERS = [
+    ("*Hyperelastic, neo hooke\n0.5, 0.2\n", fc.NeoHookean(E=90.0 / 31.0, nu=28.0 / 62.0)),
+    ("*Hyperelastic, mooney-rivlin\n0.4, 0.1, 0.2\n", fc.MooneyRivlin(0.4, 0.1, bulk=10.0)),
+    ("*Hyperelastic, yeoh\n0.5, -0.1, 0.01, 0.2\n", fc.Yeoh(0.5, -0.1, 0.01, bulk=10.0)),
+    ("*Hyperelastic, ogden, n=2\n0.8, 2., 0.2, -1., 0.2\n", fc.Ogden([0.8, 0.2], [2.0, -1.0], bulk=10.0)),
+]
+
+
+@pytest.mark.parametrize(("keyword", "law"), first_of(2, RUBBERS))
 def test_hyperelastic_materials(tmp_path, keyword, law):
     deck = deck_of(tmp_path, WHOLE.replace("*Elastic\n200000., 0.\n", keyword).replace("P, 100.", "P, 0.1"))
     (found, _), *_ = deck.model.materials
@@ -139,29 +136,13 @@ def test_plastic_tables_and_kinematic_hardening(tmp_path):
 
 
 def test_loads_ramp_from_step_to_step_and_stay_or_go(tmp_path):
-    steps = """*Step
-*Static
-*Dsload
-roof, P, 100.
-*End Step
-*Step
-*Static
-*Cload
-top, 3, -5.
-*End Step
-*Step
-*Static
-*Dsload, op=NEW
-*End Step
-*Step
-*Static
-*Cload
-15, 3, -25.
-*Dsload
-roof, P, 60.
-*End Step
-"""
-    deck = deck_of(tmp_path, WHOLE.replace(STEP, steps))
+    loads = (
+        "*Dsload\nroof, P, 100.\n",
+        "*Cload\ntop, 3, -5.\n",
+        "*Dsload, op=NEW\n",
+        "*Cload\n15, 3, -25.\n*Dsload\nroof, P, 60.\n",
+    )
+    deck = deck_of(tmp_path, WHOLE.replace(STEP, static_steps(*loads)))
     found = deck.solve()
     assert [step.load_factor for step in found] == [1.0, 2.0, 3.0, 4.0]
     forces = [step.contact["ss/sm"].force[2] for step in found]
@@ -169,22 +150,9 @@ roof, P, 60.
 
 
 def test_prescribed_displacements_go_from_value_to_value(tmp_path):
-    steps = """*Amplitude, name=wave
-0., 0., 0.5, 2., 1., 1.
-*Step
-*Static
-*Boundary
-top, 3, 3, -0.002
-*End Step
-*Step
-*Static
-*Boundary, op=NEW, amplitude=wave
-bottom, 3
-x0, 1
-y0, 2
-top, 3, 3, -0.001
-*End Step
-"""
+    wave = "*Amplitude, name=wave\n0., 0., 0.5, 2., 1., 1.\n"
+    again = SUPPORTS.replace("*Boundary", "*Boundary, op=NEW, amplitude=wave") + "top, 3, 3, -0.001\n"
+    steps = wave + static_steps("*Boundary\ntop, 3, 3, -0.002\n", again)
     deck = deck_of(tmp_path, WHOLE.replace(STEP, steps))
     found = {step.load_factor: step.displacement[deck.point(17), 2] for step in deck.solve()}
     assert found == pytest.approx({1.0: -0.002, 1.5: -0.002, 2.0: -0.001}, rel=1e-9)

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of
+from case_texts import FLAT, square
+from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of, static_steps
 from refusals import refused
-from test_refusals import FLAT, SPRING, before, in_parts
+from test_refusals import SPRING, before, in_parts
 from test_temperatures import TIED, heated
 from test_tightening import BAR, HELD, TIGHT, cooled
 
@@ -146,12 +147,8 @@ def test_body_forces_by_volume_skip_what_is_no_solid(tmp_path):
     assert step.reaction[deck.points_of("bottom"), 2].sum() == pytest.approx(6.0, rel=1e-6)
 
 
-GAPS = """*Node
-25, 0., 0., 3.
-26, 1., 0., 3.
-27, 1., 1., 3.
-28, 0., 1., 3.
-*Element, type=GAPUNI, elset=gaps
+GAPS = f"""*Node
+{square(25, 3)}*Element, type=GAPUNI, elset=gaps
 31, 15, 25
 32, 16, 26
 33, 17, 27
@@ -180,7 +177,7 @@ def test_gap_elements_that_are_no_plane_at_rest(tmp_path, change, said):
 def test_gap_elements_to_driven_nodes(tmp_path):
     """The ceiling comes down by 0.011, of which 0.001 are the gap; then it goes."""
     text = before("*Boundary\n", GAPS).replace("bottom, 3\n", "bottom, 3\nceiling, 1, 2\n")
-    steps = "".join(f"*Step\n*Static\n*Boundary\nceiling, 3, 3, {z}\n*End Step\n" for z in (-0.011, 0.01))
+    steps = static_steps(*(f"*Boundary\nceiling, 3, 3, {z}\n" for z in (-0.011, 0.01)))
     deck = deck_of(tmp_path, text.replace(STEP, steps))
     down, up = deck.solve()
     assert down.contact["gaps"].force[2] == pytest.approx(-1000.0, rel=1e-9)
@@ -203,7 +200,7 @@ def test_gap_elements_between_bodies(tmp_path):
 def test_fixed_supports_keep_where_they_are(tmp_path):
     """*BOUNDARY, FIXED after a step that moved them; in the first step it holds them at zero."""
     steps = ["*Boundary\ntop, 3, 3, -0.01\n", "*Boundary, fixed\ntop, 3\n"]
-    text = WHOLE.replace(STEP, "".join(f"*Step\n*Static\n{lines}*End Step\n" for lines in steps))
+    text = WHOLE.replace(STEP, static_steps(*steps))
     found = [step.contact["ss/sm"].force[2] for step in deck_of(tmp_path, text).solve()]
     assert found == pytest.approx([1000.0, 1000.0])
     text = WHOLE.replace("*Dsload\nroof, P, 100.\n", "*Boundary, fixed\ntop, 3\n*Cload\n5, 3, 100.\n")

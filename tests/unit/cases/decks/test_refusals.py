@@ -1,6 +1,7 @@
 """Keyword blocks and invalid decks: each is refused with its keyword, its line and a sentence."""
 
 import pytest
+from case_texts import FLAT
 from deck_text import CONTACT, MATERIAL, NODES, STEP, WHOLE, deck_of
 from refusals import refused
 
@@ -8,33 +9,6 @@ import fastcontact as fc
 from fastcontact.cases.decks import blocks, building
 from fastcontact.errors import CaseError, FileError
 
-FLAT = """*Node
-1, 0., 0.
-2, 1., 0.
-3, 1., 1.
-4, 0., 1.
-5, 2., 0.
-6, 2., 1.
-*Element, type=CPE4, elset=one
-1, 1, 2, 3, 4
-*Element, type=CPE4, elset=two
-2, 2, 5, 6, 3
-*Material, name=steel
-*Elastic
-1000., 0.3
-*Solid Section, elset=one, material=steel
-1.
-*Solid Section, elset=two, material=steel
-1.
-*Boundary
-1, 1, 2
-4, 1
-*Step
-*Static
-*Cload
-5, 1, 1.
-*End Step
-"""
 SPRING = "*Element, type=SPRINGA, elset=springs\n7, 1, 11\n"
 GAP = "*Node\n21, 0., 0., 3.\n*Element, type=GAPUNI, elset=gaps\n7, 15, 21\n"
 

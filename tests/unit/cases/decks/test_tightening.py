@@ -2,7 +2,7 @@
 
 import pytest
 from case_texts import square
-from deck_text import CONTACT, WHOLE, deck_of
+from deck_text import CONTACT, WHOLE, deck_of, static_steps
 
 import fastcontact as fc
 
@@ -38,11 +38,7 @@ HELD = "*Boundary, fixed\nbolt, 1\n"
 
 
 def cooled(lines):
-    return (
-        f"*Step\n*Static\n{lines}*Temperature\n"
-        + "".join(f"{n}, -20.\n" for n in (*range(1, 9), *range(15, 19)))
-        + "*End Step\n"
-    )
+    return static_steps(f"{lines}*Temperature\n" + "".join(f"{n}, -20.\n" for n in (*range(1, 9), *range(15, 19))))
 
 
 def test_force_first_then_the_length_stays(tmp_path):

@@ -204,23 +204,20 @@ def read(path, file_format):
 """
 
 
+REASONS = [
+    ("while True: pass", "it was not read within 1 s of computing"),
+    ("time.sleep(60)", "it was not read within 2 s"),
+    ("bytearray(1 << 40)", "it announces more data than the memory can hold"),
+    ("os.abort()", "the reading process was ended by SIGABRT"),
+    ("os._exit(3)", "the reading process failed: no answer"),
+    ("raise RuntimeError('any')", "any"),
+    ("raise SystemExit(1)", "SystemExit"),
+    ("raise RecursionError", "RecursionError"),
+]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows limits neither memory nor computing time")
-@pytest.mark.parametrize(
-    ("does", "reason"),
-    first_of(
-        4,
-        [
-            ("while True: pass", "it was not read within 1 s of computing"),
-            ("time.sleep(60)", "it was not read within 2 s"),
-            ("bytearray(1 << 40)", "it announces more data than the memory can hold"),
-            ("os.abort()", "the reading process was ended by SIGABRT"),
-            ("os._exit(3)", "the reading process failed: no answer"),
-            ("raise RuntimeError('any')", "any"),
-            ("raise SystemExit(1)", "SystemExit"),
-            ("raise RecursionError", "RecursionError"),
-        ],
-    ),
-)
+@pytest.mark.parametrize(("does", "reason"), first_of(4, REASONS))
 def test_whatever_meshio_does_to_its_process(tmp_path, monkeypatch, does, reason):
     folder = tmp_path / "fake" / "meshio"
     folder.mkdir(parents=True)

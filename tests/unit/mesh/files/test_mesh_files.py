@@ -317,21 +317,18 @@ def test_mesh_name_is_for_med_only(tmp_path):
     assert read_mesh_report(tmp_path / "mesh.med", mesh_name="mesh")[1].mesh_name == "mesh"
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    first_of(
-        4,
-        [
-            ("bad.msh", "$MeshFormat\nnonsense\n"),
-            ("bad.msh", "(0 nonsense"),
-            ("bad.vtu", "<VTKFile"),
-            ("bad.inp", "*ELEMENT, TYPE=CPS4\n1, 1, 2, 3, 4\n"),
-            ("bad.inp", "*NODE\n1, 0, 0\n*ELEMENT, TYPE=CAX4\n1, 1, 1, 1, 1\n"),
-            ("bad.mesh", "nonsense 1\n"),
-            ("bad.su2", ""),
-        ],
-    ),
-)
+UNREADABLE = [
+    ("bad.msh", "$MeshFormat\nnonsense\n"),
+    ("bad.msh", "(0 nonsense"),
+    ("bad.vtu", "<VTKFile"),
+    ("bad.inp", "*ELEMENT, TYPE=CPS4\n1, 1, 2, 3, 4\n"),
+    ("bad.inp", "*NODE\n1, 0, 0\n*ELEMENT, TYPE=CAX4\n1, 1, 1, 1, 1\n"),
+    ("bad.mesh", "nonsense 1\n"),
+    ("bad.su2", ""),
+]
+
+
+@pytest.mark.parametrize(("name", "text"), first_of(4, UNREADABLE))
 def test_unreadable_files_are_named_without_printing_or_exiting(tmp_path, capfd, name, text):
     (tmp_path / name).write_text(text)
     refused((FileError, MeshError), name.replace(".", r"\."), read_mesh, tmp_path / name)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.mesh.generate._spacing import Spacing, divide, progression
@@ -122,14 +123,12 @@ TOO_LARGE = [
 @pytest.mark.parametrize(("name", "options", "message"), TOO_LARGE)
 def test_meshes_that_nobody_can_mean(name, options, message):
     tracemalloc.start()
-    with pytest.raises(fc.MeshError, match=message):
-        fc.generate.GENERATORS[name](**options)
+    refused(fc.MeshError, message, fc.generate.GENERATORS[name], **options)
     taken = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert taken < 1 << 29
 
 
 def test_ramps_of_more_steps_than_anyone_waits_for():
-    with pytest.raises(fc.ModelError, match="4294967297 load steps are more than 1000000"):
-        fc.linear_ramp(4_294_967_297)
+    refused(fc.ModelError, "4294967297 load steps are more than 1000000", fc.linear_ramp, 4_294_967_297)
     assert len(fc.linear_ramp(1000)) == 1000
