@@ -33,7 +33,8 @@ def sentences(series: Series) -> list[str]:
 
 
 def _missing_limits(series: Series) -> str:
-    return f"{len(series.levels)} levels were solved, and an extrapolated limit needs three"
+    n = len(series.levels)
+    return f"{n} level{'s were' if n != 1 else ' was'} solved, but an extrapolated limit needs three"
 
 
 def _quantity_sentences(series: Series, quantity: str) -> Iterator[str]:
@@ -46,8 +47,8 @@ def _quantity_sentences(series: Series, quantity: str) -> Iterator[str]:
         yield f"{series.combination}: {_comparison_with_theory(series, quantity, split)}"
     if not limit.converging:
         yield (
-            f"The {title(quantity)} does not converge: its changes do not decrease on the finest mesh, and its error bar is "
-            "meaningless. It may have no limit, or finer meshes are needed."
+            f"The {title(quantity)} does not converge: its changes between levels do not decrease towards the finest mesh, and "
+            "its error bar is meaningless. It may have no limit, or finer meshes are needed."
         )
     if split is None:
         return
@@ -58,13 +59,13 @@ def _quantity_sentences(series: Series, quantity: str) -> Iterator[str]:
     if has_notable_error and abs(difference) < 0.5 * abs(split.model):
         yield (
             f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(difference)} from theory because "
-            f"its mesh error of {percent(difference - split.model)} cancels model error: the agreement does not prove a good "
-            "mesh."
+            f"its mesh error of {percent(difference - split.model)} cancels the model error: the agreement does not prove "
+            "that the mesh is fine enough."
         )
     if reference is not None:
         yield (
             f"The case's mesh-converged solution lies {'inside' if limit.contains(reference) else 'OUTSIDE'} the error bar "
-            f"of the limit ({CONFIDENCE:.0%}), {percent(limit.value / reference - 1.0)} from the limit."
+            f"of the limit ({CONFIDENCE:.0%}). The limit deviates from it by {percent(limit.value / reference - 1.0)}."
         )
 
 
@@ -79,7 +80,7 @@ def _comparison_with_theory(series: Series, quantity: str, split: Split) -> str:
             f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}, and the theory gives "
             f"{number(split.theory, 6)}. That theory is exact for the bodies of the model, so this is not a model error: "
             f"{series.combination} does not converge to it on these meshes. Compare formulations (--formulations all), or "
-            "let the meshes of the two sides match."
+            "use matching meshes on the two sides."
         )
     if not series.has_model_error(quantity):
         orders = ", ".join(f"{order:.2g}" for order in series.orders(quantity)[1:])
@@ -115,7 +116,7 @@ def _equal_force_sentences(series: Series) -> Iterator[str]:
         return
     splits = {
         "of the largest pressure is": at_force,
-        ", that of the contact radius": series.split_equal_force("contact_radius"),
+        ", and that of the contact radius is": series.split_equal_force("contact_radius"),
     }
     errors = [f"{name} {percent(s.model)} (+- {100 * s.uncertainty:.2g} %)" for name, s in splits.items() if s]
     text = f"{series.combination}: at equal force the model error {''.join(errors)}"

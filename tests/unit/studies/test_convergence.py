@@ -92,7 +92,7 @@ def test_two_levels_have_no_limit_and_say_so(case):
     study = gathered(case, [[made_up(0), made_up(1)]])
     assert not study.best.limits
     text = "\n".join(study.lines())
-    assert "no limits: 2 levels were solved, and an extrapolated limit needs three" in text
+    assert "no limits: 2 levels were solved, but an extrapolated limit needs three" in text
     assert study.as_dict()["quantities"]["force"]["limit"] is None
     assert np.isnan(study.best.orders("force")).all()
     study.figure()
@@ -144,7 +144,7 @@ def test_a_mesh_that_agrees_with_theory_by_chance_is_told(case):
     for k, level in enumerate(levels):
         level["values"]["pressure_max"] = 1.04 * PRESSURE * (1.0 - 0.16 * 0.25**k)
     text = "\n".join(gathered(case, [levels]).lines())
-    assert "the agreement does not prove a good mesh" in text
+    assert "the agreement does not prove that the mesh is fine enough" in text
     assert "Level 1 " in text
 
 
