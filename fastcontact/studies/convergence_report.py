@@ -47,8 +47,8 @@ def _quantity_sentences(series: Series, quantity: str) -> Iterator[str]:
         yield f"{series.combination}: {_comparison_with_theory(series, quantity, split)}"
     if not limit.converging:
         yield (
-            f"The {title(quantity)} does not converge: its changes between levels do not decrease towards the finest mesh, and "
-            "its error bar is meaningless. It may have no limit, or finer meshes are needed."
+            f"The {title(quantity)} does not converge: its changes between levels do not decrease towards the finest mesh, "
+            "and its error bar is meaningless. It may have no limit, or finer meshes are needed."
         )
     if split is None:
         return
