@@ -193,12 +193,11 @@ def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
             if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
                 return [f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close"]
     pairs = {name: problem.pairs[name] for name in nodes}
-    faceted = [name for name, pair in pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
+    between_bodies = {name: pair for name, pair in pairs.items() if len(pair.primary.points)}
+    faceted = [name for name, pair in between_bodies.items() if pair.normals == "facet"]
+    dual = [name for name, pair in between_bodies.items() if getattr(pair, "multipliers", "") == "dual"]
     laws = {name: pair.options.cohesion for name, pair in pairs.items() if pair.options.cohesion is not None}
     ranges = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
-    dual = [
-        name for name, pair in pairs.items() if getattr(pair, "multipliers", "") == "dual" and len(pair.primary.points)
-    ]
     pairs_by_remedy = {
         'normals="averaged"': faceted, 'multipliers="standard"': dual,
         f"facets no longer than the range of adhesion, {min(ranges.values(), default=0.0):.3g},": list(ranges),

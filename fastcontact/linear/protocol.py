@@ -222,7 +222,7 @@ class LinearSolver(Protocol):
         return False
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
+        self, K: bsr_array, modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Factorise the matrix, or build a multigrid hierarchy.
 
@@ -230,7 +230,7 @@ class LinearSolver(Protocol):
         ----------
         K : bsr_array (n, n)
             Symmetric positive definite matrix [force / length].
-        rigid_modes : ndarray (n, n_modes)
+        modes : ndarray (n, n_modes)
             Rigid-body modes, which span the near null space of K [length].
         involved : ndarray of int (k,), optional
             Unknowns that may occur in equations, which solvers may use to save work. By default, all unknowns may occur.

@@ -73,10 +73,10 @@ class Amg(Multigrid, LinearSolver):
         return self.replacement is None
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
+        self, K: bsr_array, modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        self.build(K, rigid_modes, release)
+        self.build(K, modes, release)
         self._involved, self.replacement, self._factor_solver, self.replacement_reason = involved, None, None, ""
         return self.K if release else K
 
