@@ -161,12 +161,9 @@ def _with_sums(substeps: list[StepResult]) -> StepResult:
     iterations = {**end.iterations, "substeps": [substep.load_factor for substep in substeps], "history": history}
     for name in ("geometry_updates", "active_set_iterations", "linear_iterations"):
         iterations[name] = sum(log[name] for log in logs)
-    contact = {
-        name: replace(
-            result,
-            dissipation=sum(substep.contact[name].dissipation for substep in substeps),
-            slip=np.sum([substep.contact[name].slip for substep in substeps], axis=0),
-        )
-        for name, result in end.contact.items()
-    }
+    contact = {}
+    for name, result in end.contact.items():
+        parts = [substep.contact[name] for substep in substeps]
+        slip = np.sum([part.slip for part in parts], axis=0)
+        contact[name] = replace(result, dissipation=sum(part.dissipation for part in parts), slip=slip)
     return replace(end, contact=contact, iterations=iterations)

@@ -148,10 +148,8 @@ class MaterialField:
     def n_cells_without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return the number of cells of materials without expansion whose `rise` (n_points,) [temperature] is not zero."""
         no_expansion = np.isnan(self.expansion[:, 0])
-        return sum(
-            int(np.count_nonzero(no_expansion[self.rows[name]] & (rise[block] != 0.0).any(axis=1)))
-            for name, block in mesh.solids.items()
-        )
+        heated = {name: (rise[block] != 0.0).any(axis=1) for name, block in mesh.solids.items()}
+        return sum(int(np.count_nonzero(no_expansion[self.rows[name]] & heated[name])) for name in heated)
 
     @cached_property
     def distinct(self) -> dict[str, Numbers]:

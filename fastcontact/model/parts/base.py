@@ -19,7 +19,7 @@ from fastcontact.elasticity.loads import Load, Value, check_number, check_solids
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import KINEMATICS, Material
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies, check_law, field_names, nonlinear_bodies
+from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies, check_law, field_names
 from fastcontact.elasticity.nonlinear_materials import STRAINS, NonlinearElastic
 from fastcontact.elasticity.springs import Springs
 from fastcontact.elasticity.stiffness import stiffness
@@ -256,7 +256,7 @@ class ModelBase(NameSuggestions):
 
     def nonlinear_bodies(self, field: MaterialField) -> NonlinearBodies | None:
         """Return the solid cells as nonlinear bodies with the materials of `field`; None if the bodies are linear elastic."""
-        return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
+        return NonlinearBodies(self.mesh, self.kinematics, self.strain, field) if self.nonlinear else None
 
     def refuse_nonlinear(self, feature: str) -> None:
         """Raise ModelError if bodies are nonlinear. The message begins with `feature`, for example "sensitivities are"."""
