@@ -235,9 +235,8 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
         K = with_springs(K, model.springs)
     if step is None:
         return K
-    temperature, initial, pressures, spins = (
-        step.iterations.get(f"{name}_factors", ()) for name in ("temperature", "initial", "pressure", "spin")
-    )
+    names = ("temperature", "initial", "pressure", "spin")
+    temperature, initial, pressures, spins = (step.iterations.get(f"{name}_factors", ()) for name in names)
     deformation = np.zeros_like(step.displacement)
     if bodies is not None:
         if model.strain == "small":

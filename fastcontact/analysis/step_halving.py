@@ -133,11 +133,9 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
         return False
     zero = np.zeros(problem.model.mesh.dim)
     poses = [np.stack([ends.obstacles.get(name, zero) for name in pairs]) for ends in (state, after)]
-    rotation_lengths = [
-        abs(angle - state.angles.get(name, 0.0)) * float(np.linalg.norm(np.ptp(pairs[name].points, axis=0)))
-        for name, angle in after.angles.items() if name in pairs
-    ]  # fmt: skip
-    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *rotation_lengths)
+    turns = {name: abs(angle - state.angles.get(name, 0.0)) for name, angle in after.angles.items() if name in pairs}
+    arcs = [turn * float(np.linalg.norm(np.ptp(pairs[name].points, axis=0))) for name, turn in turns.items()]
+    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *arcs)
     if motion < min(float(facet_lengths(pair).min()) for pair in pairs.values()):
         return False
     load = problem.load_at(after.instant)

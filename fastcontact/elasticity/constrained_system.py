@@ -117,8 +117,8 @@ class System(ConstrainedMotion):
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
     relations : sequence of MultiPointConstraint
-    without_stiffness : ndarray of bool (n,), optional
-        Components that are unknowns although they have no stiffness, such as those of rigid obstacles; by default none.
+    without_stiffness : ndarray of bool (n,)
+        Components that are unknowns although they have no stiffness, such as those of rigid obstacles.
 
     Attributes
     ----------

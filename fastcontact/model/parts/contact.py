@@ -420,7 +420,7 @@ class ModelContact(ModelConnections):
         ends = [(i.first, i.second, unit if i.turn is None else i.turn) for i in self.periodic_interfaces]
         secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
         has_obstacle = pair.obstacle is not None
-        options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=has_obstacle)
+        options = pair_options(pair.name, pair.options, self.mesh, secondary, has_obstacle)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
             if not kind.allows_obstacles:
