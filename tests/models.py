@@ -113,7 +113,7 @@ class DenseCompliance:
     def block(self, rows):
         return self.C[np.ix_(rows, rows)]
 
-    among = block
+    block_operator = block
 
     def apply(self, multiplier):
         return self.C @ multiplier

@@ -29,13 +29,13 @@ class ActiveDofs:
     Parameters
     ----------
     system : System
-    contact_dofs : ndarray of int
+    contact : ndarray of int
         Components that contact constraints may involve, in ascending order.
     springs : ndarray of int
         Components to which the springs of floating bodies are attached.
     unknowns : ndarray of int (l,), optional
         Unknowns on which these components depend, in ascending order, see `System.involved`: the active unknowns after static
-        condensation. The active components are then `contact_dofs` and `springs`. Without condensation, all components and
+        condensation. The active components are then `contact` and `springs`. Without condensation, all components and
         all unknowns are active.
 
     Attributes
@@ -51,12 +51,10 @@ class ActiveDofs:
         on the active components to generalised forces.
     """
 
-    def __init__(
-        self, system: System, contact_dofs: Indices, springs: Indices, unknowns: Indices | None = None
-    ) -> None:
-        involved, all_dofs = np.union1d(contact_dofs, springs), np.arange(len(system.free))
+    def __init__(self, system: System, contact: Indices, springs: Indices, unknowns: Indices | None = None) -> None:
+        involved, all_dofs = np.union1d(contact, springs), np.arange(len(system.free))
         self.active, self._unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
-        self.compared, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact_dofs, involved))
+        self.compared, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact, involved))
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free
         self._system, self.T = system, csr_array(csr_array(T)[self.active][:, self._unknowns])

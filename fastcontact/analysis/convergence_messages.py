@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
+from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.rigid_motions import NEARLY_SLIDING, grouped_by_body, least_restrained
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -172,12 +173,14 @@ def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indic
 
 def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
     """Return a description of nodes by contact pair, with the coordinates of the first three."""
-    texts = []
-    for name, points in nodes.items():
-        listed = ", ".join(f"{p} {np.array2string(problem.model.mesh.points[p], precision=4)}" for p in points[:3])
-        remainder = f" and {len(points) - 3} more" if len(points) > 3 else ""
-        texts.append(f"points {listed}{remainder} of contact '{name}'")
-    return "; ".join(texts)
+    mesh = problem.model.mesh
+    return "; ".join(f"{first_points(mesh, points)} of contact '{name}'" for name, points in nodes.items())
+
+
+def first_points(mesh: Mesh, points: Sequence[int]) -> str:
+    """Return the numbers and coordinates of the first three points of a list, and the number of the others."""
+    listed = ", ".join(f"{p} {np.array2string(mesh.points[p], precision=4)}" for p in points[:3])
+    return f"points {listed}{f' and {len(points) - 3} more' if len(points) > 3 else ''}"
 
 
 def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
@@ -193,12 +196,11 @@ def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
             if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
                 return [f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close"]
     pairs = {name: problem.pairs[name] for name in nodes}
-    faceted = [name for name, pair in pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
+    between_bodies = {name: pair for name, pair in pairs.items() if len(pair.primary.points)}
+    faceted = [name for name, pair in between_bodies.items() if pair.normals == "facet"]
+    dual = [name for name, pair in between_bodies.items() if getattr(pair, "multipliers", "") == "dual"]
     laws = {name: pair.options.cohesion for name, pair in pairs.items() if pair.options.cohesion is not None}
     ranges = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
-    dual = [
-        name for name, pair in pairs.items() if getattr(pair, "multipliers", "") == "dual" and len(pair.primary.points)
-    ]
     pairs_by_remedy = {
         'normals="averaged"': faceted, 'multipliers="standard"': dual,
         f"facets no longer than the range of adhesion, {min(ranges.values(), default=0.0):.3g},": list(ranges),

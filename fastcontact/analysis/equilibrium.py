@@ -237,12 +237,11 @@ class Balance:
 
     def failure(self, index: int, problem: Problem, history: Sequence[dict[str, Any]]) -> ConvergenceError:
         """Return the error for step `index`, in which the residual exceeds its bound."""
-        tolerance_advice = (
-            f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
-        )
+        tolerance = 2 * self.relative
+        advice = f", or accept it with Criteria(relative={tolerance:.0e})" if tolerance <= NOTABLE else ""
         remedy = "use the direct solver" if problem.solver.iterative else (
             "round-off prevents a smaller one if moduli or displacements differ by many orders of magnitude. Replace a stiff "
-            f"body by a rigid obstacle{tolerance_advice}"
+            f"body by a rigid obstacle{advice}"
         )  # fmt: skip
         return ConvergenceError(
             f"step {index}: the out-of-balance force {self.residual:.3g} stays above {self.bound:.3g} "

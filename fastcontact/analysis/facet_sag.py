@@ -125,10 +125,8 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
         sag = np.einsum("nk,nk->n", points.shape[rows[facing]], node_gaps[facing]) - point_gaps[facing]
         spread = float(np.ptp(sag)) if len(sag) else 0.0
         return spread, spread / extent
-    smoothing, pairing = (
-        Smoothing.of(pair.secondary, pair.primary, pair.points),
-        pair.pair_candidates(points, configuration),
-    )
+    smoothing = Smoothing.of(pair.secondary, pair.primary, pair.points)
+    pairing = pair.pair_candidates(points, configuration)
     rows = np.flatnonzero(pairing.paired)
     in_contact = closed[points.nodes[rows]].any(axis=1)
     if smoothing is None or points.facet is None or points.xi is None or not in_contact.any():
@@ -141,9 +139,7 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     if pair.secondary.order == 2:
         return spread, spread / facet_length(pair.secondary, pair.points)
     blocks = zip(pair.secondary.blocks, rules, strict=True)
-    weights = [
-        np.repeat(_lengths(block, pair.points), len(w)) * np.tile(w, len(block.facets)) for block, (_, w) in blocks
-    ]
+    weights = [np.outer(_lengths(block, pair.points), w).ravel() for block, (_, w) in blocks]
     return spread, max(offset, _slope(pair, points, np.concatenate(weights), sag, closed))
 
 

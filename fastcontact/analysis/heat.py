@@ -17,7 +17,7 @@ from fastcontact.heat.loads import Film, Heating
 from fastcontact.linear import choice
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.model import Model
-from fastcontact.model.ramp import Ramp, Table, combined
+from fastcontact.model.ramp import Ramp, Table, combined, sums_by_ramp
 from fastcontact.model.rigid_motions import body_name
 from fastcontact.round_off import SUM_ROUND_OFF
 
@@ -63,18 +63,13 @@ class ThermalLoads:
 
 def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoads:
     """Return the heat loads and films of a model, whose areas and volumes are deformed by a displacement (n_points, dim)."""
-    mesh, films = model.mesh, csr_array((model.mesh.n_points,) * 2)
+    mesh, films = model.mesh, [load for load in model.heat_loads if isinstance(load, Film)]
     deformed = mesh if displacement is None else mesh.replace(points=mesh.points + displacement)
     geometry = mesh, model.kinematics, deformed
-    powers: dict[Table | None, Array] = {}
-    ambient: dict[Table | None, Array] = {}
-    for load in model.heat_loads:
-        if isinstance(load, Heating):
-            powers[load.ramp] = powers.get(load.ramp, 0.0) + load.power(*geometry)
-        elif isinstance(load, Film):
-            matrix, power = load.exchange(*geometry, model.reference_temperature)
-            films, ambient[load.ramp] = csr_array(films + matrix), ambient.get(load.ramp, 0.0) + power
-    return ThermalLoads(films, powers, ambient)
+    powers = sums_by_ramp((load.ramp, load.power(*geometry)) for load in model.heat_loads if isinstance(load, Heating))
+    exchanges = [(film.ramp, *film.exchange(*geometry, model.reference_temperature)) for film in films]
+    matrix = sum((matrix for _, matrix, _ in exchanges), csr_array((mesh.n_points, mesh.n_points)))
+    return ThermalLoads(csr_array(matrix), powers, sums_by_ramp((ramp, power) for ramp, _, power in exchanges))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,8 @@ Indices = NDArray[np.signedinteger]
 # Numbers of two bodies, outer nodes of the first (n,), and the depths of these nodes in the second (n,) [length].
 Overlap = tuple[int, int, Indices, Array]
 Contacts = Mapping[str, ContactResult]
+# Names of the contact pairs between two bodies, by the numbers of the bodies.
+PairsBetween = Mapping[frozenset[int], Sequence[str]]
 # Number, displacements (n_points, dim) and contact results of a step.
 Peak = tuple[int, Array, Contacts]
 # Depth of nodes beside the facets of a contact above which a warning is given, relative to the largest depth of its nodes.
@@ -54,7 +56,7 @@ def interpenetration(problem: Problem, last: StepResult, peaks: Sequence[Peak]) 
     return warnings
 
 
-def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
+def _pairs_between(problem: Problem) -> PairsBetween:
     """Return the names of the contact pairs between any two bodies; empty for the two sides of a pretension section."""
     body = bodies(problem.model.mesh)[1]
     groups: dict[frozenset[int], list[str]] = {}
@@ -68,9 +70,7 @@ def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
     return groups
 
 
-def _without_contact(
-    problem: Problem, pairs_between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Overlap]
-) -> list[str]:
+def _without_contact(problem: Problem, pairs_between: PairsBetween, overlaps: Sequence[Overlap]) -> list[str]:
     """Return a warning for any two overlapping bodies without a contact pair between them, the deepest overlap first."""
     mesh, texts = problem.model.mesh, dict[frozenset[int], str]()
     _, body = bodies(mesh)
@@ -88,7 +88,7 @@ def _without_contact(
 
 
 def _beside_contact(
-    problem: Problem, displacement: Array, contact: Contacts, pairs_between: Mapping[frozenset[int], Sequence[str]],
+    problem: Problem, displacement: Array, contact: Contacts, pairs_between: PairsBetween,
     overlaps: Sequence[Overlap],
 ) -> list[str]:  # fmt: skip
     """Return warnings about bodies that pass through each other where the groups of their contact pairs lack facets."""

@@ -164,11 +164,9 @@ def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[
     linear, axisymmetric = problem.bodies is None, problem.model.kinematics == "axisymmetric"
     if axisymmetric and not linear:
         return []
-    has_modes = all(material.incompatible_modes for material, _ in problem.model.materials)
-    names = [
-        name for name in problem.model.mesh.solids
-        if elements.get(name).order == 1 and not (has_modes and name in BENDING_ELEMENTS)
-    ]  # fmt: skip
+    have_modes = all(material.incompatible_modes for material, _ in problem.model.materials)
+    bending = BENDING_ELEMENTS if have_modes else ()
+    names = [name for name in problem.model.mesh.solids if elements.get(name).order == 1 and name not in bending]
     energy, pressure = _stress_scatter(problem, state, step, names)
     if pressure > ALTERNATING and linear:
         nu = _poisson_ratios(problem.model, problem.field)[0].max()

@@ -122,11 +122,9 @@ def modes(
     return result
 
 
-def _diameters(
-    model: Model, sectors: Sectors | None, nodal_diameters: int | str | Sequence[int] | None
-) -> list[int] | None:
+def _diameters(model: Model, sectors: Sectors | None, requested: int | str | Sequence[int] | None) -> list[int] | None:
     """Return the requested nodal diameters; None by default. ModelError if the model is not a sector of a ring."""
-    if nodal_diameters is None:
+    if requested is None:
         if sectors is not None:
             warn(
                 f"only modes with 0 nodal diameters are computed, which are alike in all {sectors.number} sectors: request "
@@ -140,7 +138,7 @@ def _diameters(
             f"obstacle '{model.force_driven.pairs[0].name}' is driven by a force but not part of a sector, so that "
             "modes with nodal diameters cannot include it: prescribe its motion"
         )
-    return sectors.diameters(nodal_diameters)
+    return sectors.diameters(requested)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,13 +179,10 @@ class _Vibration:
 
     def warn_of_sliding_modes(self, values: Array, vectors: Array) -> None:
         """Warn of eigenvalues (n,) close to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
-        nearly_rigid = vectors[:, np.abs(values) < self.shift]
-        sliding = [
-            np.abs(held.rows @ nearly_rigid)
-            > SINGLE_PRECISION * (abs(held.rows) @ np.abs(nearly_rigid)).max(initial=0.0)
-            for held in self.with_sliding
-        ]
-        if nearly_rigid.shape[1] and (count := int(np.any([slides.any(axis=0) for slides in sliding], axis=0).sum())):
+        rigid = vectors[:, np.abs(values) < self.shift]
+        rows = [conditions.rows for conditions in self.with_sliding]
+        sliding = [np.abs(B @ rigid) > SINGLE_PRECISION * (abs(B) @ np.abs(rigid)).max(initial=0.0) for B in rows]
+        if rigid.shape[1] and (count := int(np.any([slides.any(axis=0) for slides in sliding], axis=0).sum())):
             warn(
                 f"{count} of {len(values)} modes have frequencies close to zero (the lowest {_frequencies(values)[0]:.3g}), "
                 "since nodes that slide in this step are free along the surface: hold_sliding=True holds them, as friction "
@@ -236,14 +231,12 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
     """
     mesh, kinematics, bodies = model.mesh, model.kinematics, model.nonlinear_bodies(field)
     if step is None or bodies is None:
-        K = with_springs(
-            stiffness(mesh, kinematics, field.moduli, field.moduli_rows, None, field.treatment), model.springs
-        )
+        K = stiffness(mesh, kinematics, field.moduli, field.moduli_rows, None, field.treatment)
+        K = with_springs(K, model.springs)
     if step is None:
         return K
-    temperature, initial, pressures, spins = (
-        step.iterations.get(f"{name}_factors", ()) for name in ("temperature", "initial", "pressure", "spin")
-    )
+    names = ("temperature", "initial", "pressure", "spin")
+    temperature, initial, pressures, spins = (step.iterations.get(f"{name}_factors", ()) for name in names)
     deformation = np.zeros_like(step.displacement)
     if bodies is not None:
         if model.strain == "small":

@@ -14,17 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
+from fastcontact.analysis import equilibrium
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.criteria import HALVINGS, MAX_NEWTON_ITERATIONS, NOTABLE
-from fastcontact.analysis.equilibrium import (
-    Balance,
-    FollowingForce,
-    StepEquilibrium,
-    Terms,
-    balance,
-    solve_displacements,
-    with_loads,
-)
+from fastcontact.analysis.equilibrium import Balance, FollowingForce, StepEquilibrium, Terms, balance
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
@@ -63,7 +56,7 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
     """
     start = begin.state
     if begin.problem.bodies is None:
-        return _equilibrium_of_linear_bodies(begin, load, before)
+        return _linear_equilibrium(begin, load, before)
     if before is not None or start.extrapolation.ratio:
         origin = start.extrapolation.predicted(start.u) if before is None else before.u
         try:
@@ -74,9 +67,7 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
     return _Newton(begin, load, before).equilibrium_from(start.u)
 
 
-def _equilibrium_of_linear_bodies(
-    begin: StepContext, load: StepLoad, before: StepEquilibrium | None
-) -> StepEquilibrium:
+def _linear_equilibrium(begin: StepContext, load: StepLoad, before: StepEquilibrium | None) -> StepEquilibrium:
     """Return the result of `newton` for linear bodies, whose tangents are constant.
 
     As long as forces do not balance, the contact problem is solved again, with more accurate linear solutions.
@@ -85,9 +76,9 @@ def _equilibrium_of_linear_bodies(
     iterate = Iterate.of(start) if before is None or before.settled is None else before.settled.iterate
     while True:
         unchanged = load is begin.load and settled is None
-        step = begin if unchanged else replace(begin, load=load, loaded=with_loads(problem, load))
+        step = begin if unchanged else replace(begin, load=load, loaded=equilibrium.with_loads(problem, load))
         settled = settle_geometry(step, iterate)
-        u, contact_force = solve_displacements(step, settled, u)
+        u, contact_force = equilibrium.solve_displacements(step, settled, u)
         force = problem.system.K @ u
         internal = force, (0.5 * float(u @ force), 0.0)
         force_balance = balance(problem, u, contact_force, load.force, start.largest_force, internal)
@@ -263,7 +254,7 @@ class _Newton:
         failure: Exception | None = None
         for regularisation in self._regularisations():
             try:
-                solution = self._linearised_contact(u, changes, regularisation)
+                solution = self._solve_linearised(u, changes, regularisation)
             except (ModelError, ConvergenceError) as error:
                 log.info("the tangent fails with %s: %s", regularisation, error)
                 failure = error
@@ -293,9 +284,7 @@ class _Newton:
         parts = range(min(geometric + 1, COMPLETE))[::-1]
         return [*unmodified, *with_springs, *(Regularisation(part, stiff=floats) for part in parts)]
 
-    def _linearised_contact(
-        self, u: Array, changes: list[float], regularisation: Regularisation
-    ) -> tuple[Array, Array]:
+    def _solve_linearised(self, u: Array, changes: list[float], regularisation: Regularisation) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
         suffices = self._reusable is not None and self._tangent_suffices(changes)
@@ -320,11 +309,11 @@ class _Newton:
         tolerance = min(max(problem.criteria.geometry, MAX_TOLERANCE * changes[-1]), NOTABLE)
         step = replace(
             self._begin, problem=replace(problem, criteria=replace(problem.criteria, geometry=tolerance)), load=load,
-            state=replace(self._start, extrapolation=Extrapolation()), loaded=with_loads(problem, load),
+            state=replace(self._start, extrapolation=Extrapolation()), loaded=equilibrium.with_loads(problem, load),
         )  # fmt: skip
         paired = self._settled if self._moved_fully and problem.linearised_at is None else None
         settled = settle_geometry(step, iterate, paired)
-        solution = solve_displacements(step, settled, u, self._linear_tolerance)
+        solution = equilibrium.solve_displacements(step, settled, u, self._linear_tolerance)
         self._settled = settled
         self._reusable = problem if regularisation.geometric == COMPLETE else None
         return solution

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ from fastcontact.model.contact_pair import angle_at
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
 from fastcontact.model.pretension import Pretension
-from fastcontact.model.ramp import PartHistory, Ramp, Table, combined, multiplier
+from fastcontact.model.ramp import PartHistory, Ramp, Table, combined, multiplier, sums_by_ramp
 from fastcontact.model.rigid_motions import FreeMotions, free_motions
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -204,24 +204,18 @@ class Problem:
         """Return the loads at an instant of the ramp."""
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         lift = self.system.lift(prescribed.ravel(), self.factors(self.model.relations, instant))
-        obstacles, clearance_factors, angles, friction_factors, fluids = {}, {}, {}, {}, {}
-        for pair in self.model.contact:
-            side = self.pairs[pair.name].primary
-            if isinstance(side, RigidSide):
-                obstacles[pair.name] = multiplier(pair.ramp, self.ramp, instant) * side.motion
-            if pair.rotation is not None:
-                angles[pair.name] = angle_at(pair, self.ramp, instant)
-            if pair.clearance_ramp is not None:
-                clearance_factors[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
-            if pair.friction_ramp is not None:
-                friction_factors[pair.name] = multiplier(pair.friction_ramp, self.ramp, instant)
-            if pair.fluid is not None:
-                fluids[pair.name] = pair.fluid.pressure * multiplier(pair.fluid.ramp, self.ramp, instant)
+        pairs, at = self.model.contact, partial(multiplier, ramp=self.ramp, instant=instant)
+        sides = [(pair, self.pairs[pair.name].primary) for pair in pairs]
+        obstacles = {p.name: at(p.ramp) * side.motion for p, side in sides if isinstance(side, RigidSide)}
+        clearances = {p.name: at(p.clearance_ramp) for p in pairs if p.clearance_ramp is not None}
+        angles = {p.name: angle_at(p, self.ramp, instant) for p in pairs if p.rotation is not None}
+        friction = {p.name: at(p.friction_ramp) for p in pairs if p.friction_ramp is not None}
+        fluids = {p.name: p.fluid.pressure * at(p.fluid.ramp) for p in pairs if p.fluid is not None}
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
-        following = tuple(multiplier(table, self.ramp, instant) for _, table in self.following)
+        following = tuple(at(table) for _, table in self.following)
         temperatures = self.factors(self.model.temperatures, instant)
         rise = None if self.bodies is None else self.model.temperature_rise(temperatures)
-        return StepLoad(lift, force, obstacles, clearance_factors, angles, following, friction_factors, fluids, rise)
+        return StepLoad(lift, force, obstacles, clearances, angles, following, friction, fluids, rise)
 
     def factors(
         self, histories: Iterable[Temperature | InitialState | Pretension | Load | MultiPointConstraint], instant: float
@@ -345,12 +339,8 @@ def prepare(
     K = stiffness(mesh, model.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
     warnings = stiffness_warnings(K, model.springs)
     K = with_springs(K, model.springs)
-    system = System(
-        driven.stiffness(K),
-        driven.supported(supported).ravel(),
-        driven.relations(model.relations),
-        driven.without_stiffness,
-    )
+    fixed, relations = driven.supported(supported).ravel(), driven.relations(model.relations)
+    system = System(driven.stiffness(K), fixed, relations, driven.without_stiffness)
     driven_points = mesh.n_points + np.arange(len(driven))
     side_points = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
     points = np.unique(np.concatenate([driven_points, *side_points])).astype(np.intp)
@@ -403,10 +393,8 @@ def linearised(
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))
         floating = None if values[0] > SINGLE_PRECISION * values[-1] else floating
     dofs = _prepared_dofs(model, solver, system, floating, problem.contact_dofs, displacement)
-    linearised_at = u if finite else None
-    return replace(
-        problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=linearised_at
-    )
+    point = u if finite else None
+    return replace(problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=point)
 
 
 def _floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
@@ -425,11 +413,8 @@ def _forces(model: Model) -> dict[Table | None, Array]:
 
     They include loads, initial states and, for linear bodies, thermal expansion.
     """
-    forces = model.forces_by_ramp()
     thermal = {} if model.nonlinear else model.thermal_forces_by_ramp()
-    for table, values in (*thermal.items(), *model.initial_forces_by_ramp().items()):
-        forces[table] = forces[table] + values if table in forces else values
-    return forces
+    return sums_by_ramp([*model.forces_by_ramp().items(), *thermal.items(), *model.initial_forces_by_ramp().items()])
 
 
 def _prepared_dofs(

@@ -532,7 +532,7 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
     """Return the remedy for oscillating pressures of a pair."""
     from fastcontact.contact.found_contacts import NOTABLE_MODULUS_RATIO
 
-    side, primary = pair.secondary, pair.primary
+    side, group, primary = pair.secondary, pair.secondary.group, pair.primary
     if isinstance(primary, Surface):
         modulus, other = (_modulus(model, surface.points) for surface in (side, primary))
         if modulus > NOTABLE_MODULUS_RATIO * other:
@@ -541,19 +541,17 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
         return "use formulation mortar"
     beside = [name for name, block in model.mesh.solids.items() if np.isin(block, side.points).any()]
     if any(name[:3] not in ("qua", "hex") for name in beside):
-        return (
-            f"use quadrangles or hexahedra along '{side.group}', or triangles or tetrahedra there about as deep as wide"
-        )
+        return f"use quadrangles or hexahedra along '{group}', or triangles or tetrahedra there about as deep as wide"
     if not isinstance(primary, Surface):
-        return f"use smaller facets of '{side.group}'"
+        return f"use smaller facets of '{group}'"
     length, opposite = (facet_length(surface, pair.points) for surface in (side, primary))
     if length > (1.0 + NEGLECTED) * opposite:
-        return f"use facets of '{side.group}' that are at most as large as the opposite ones"
+        return f"use facets of '{group}' that are at most as large as the opposite ones"
     if side.order == 2 and pair.points.shape[1] == 2 and getattr(pair, "multipliers", "") == "dual":
         # Errors of pressures on a heated shrink fit were 0.11 to 0.17, and with standard multipliers at most 0.002. At sharp
         # edges standard multipliers increase them.
         return 'use multipliers="standard" if the contact has no sharp edges'
-    return f"use smaller facets of both '{side.group}' and '{primary.group}'"
+    return f"use smaller facets of both '{group}' and '{primary.group}'"
 
 
 def _modulus(model: Model, points: NDArray[np.integer]) -> float:

@@ -19,7 +19,7 @@ from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import fields_table
 from fastcontact.analysis import restart
-from fastcontact.analysis.convergence_messages import named_nodes, nearest_nodes
+from fastcontact.analysis.convergence_messages import first_points, named_nodes, nearest_nodes
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.load_step import prepare_start
 from fastcontact.analysis.newton import newton
@@ -186,11 +186,9 @@ def _kink_message(contact: MovingContact, kinks: csr_array, jump: float) -> str:
     mesh = contact.problem.model.mesh
     dofs = np.unique(kinks.indices)
     points = np.unique(dofs[dofs < contact.problem.model.n_dofs] // mesh.dim)
-    first_points = ", ".join(f"{p} {np.array2string(mesh.points[p], precision=4)}" for p in points[:3])
-    remainder = f" and {len(points) - 3} more" if len(points) > 3 else ""
     return (
-        f"points {first_points}{remainder} lie opposite nodes of the other side, between two of its facets: the one-sided "
-        f"derivatives differ by a relative amount of {jump:.1e}. {OPPOSITE_NODES}"
+        f"{first_points(mesh, points.tolist())} lie opposite nodes of the other side, between two of its facets: the "
+        f"one-sided derivatives differ by a relative amount of {jump:.1e}. {OPPOSITE_NODES}"
     )
 
 

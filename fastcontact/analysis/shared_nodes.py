@@ -103,8 +103,7 @@ class SharedNodes:
         products = np.einsum("mjd,mkd->kjm", self.frame, self.frame[self.representative]) * self.tangential_fraction
         tangents = constraints.tangents
         return tuple(
-            csr_array(sum(self._sums @ scaled(T, factor) for factor, T in zip(factors, tangents)))
-            for factors in products
+            csr_array(sum(self._sums @ scaled(T, factor) for factor, T in zip(row, tangents))) for row in products
         )
 
     def _mean(self, components: Array, weight: Array) -> Array:

@@ -381,10 +381,8 @@ def in_last_increment(constraints: Constraints, slip_so_far: SlipSoFar) -> Const
 def over_whole_step(solution: Solution, slip_so_far: SlipSoFar) -> Solution:
     """Return the solution with the slips and the integrals of the step, given the solution of its last increment."""
     directions = np.stack(solution.directions, axis=1)
-    before, slip_before_closing, traction = (
-        (vectors[:, None] * directions).sum(axis=2)
-        for vectors in (slip_so_far.slip, slip_so_far.slip_before_closing, slip_so_far.traction)
-    )
+    vectors = slip_so_far.slip, slip_so_far.slip_before_closing, slip_so_far.traction
+    before, slip_before_closing, traction = ((v[:, None] * directions).sum(axis=2) for v in vectors)
     forces = (np.vstack([slip_so_far.normal, traction.T]), np.vstack([solution.multiplier, solution.tangential.T]))
     integrals = slip_so_far.integrals + _integrals(*forces, solution.slip.T, 1.0 - slip_so_far.begin)
     return replace(solution, slip=solution.slip + before, integrals=integrals, slip_before_closing=slip_before_closing)

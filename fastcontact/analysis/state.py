@@ -143,16 +143,15 @@ class State:
             **({} if self.rise is None else {"rise": self.rise.copy(), "instant": self.instant}),
             **{name: dict(getattr(self, name)) for name in (*REQUIRED_ARRAYS, *ARRAYS)},
             **{name: {pair: vars(data) for pair, data in getattr(self, name).items()} for name in CLASSES},
-            "pairs": {
-                pair: {
-                    key: list(value) if isinstance(value := getattr(self, name).get(pair), tuple) else value
-                    for key, name in PAIR_DATA.items()
-                }
-                for pair in self.active
-            },
+            "pairs": {pair: self._data_of_pair(pair) for pair in self.active},
             "extrapolation": self.extrapolation.to_dict(),
             "solver": self.solver,
         }
+
+    def _data_of_pair(self, pair: str) -> dict[str, Any]:
+        """Return the entries of `PAIR_DATA` for a contact pair, with lists instead of tuples."""
+        values = {key: getattr(self, name).get(pair) for key, name in PAIR_DATA.items()}
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], displacement: Array, touched: frozenset[str]) -> State:

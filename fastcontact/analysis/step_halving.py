@@ -133,11 +133,9 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
         return False
     zero = np.zeros(problem.model.mesh.dim)
     poses = [np.stack([ends.obstacles.get(name, zero) for name in pairs]) for ends in (state, after)]
-    rotation_lengths = [
-        abs(angle - state.angles.get(name, 0.0)) * float(np.linalg.norm(np.ptp(pairs[name].points, axis=0)))
-        for name, angle in after.angles.items() if name in pairs
-    ]  # fmt: skip
-    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *rotation_lengths)
+    turns = {name: abs(angle - state.angles.get(name, 0.0)) for name, angle in after.angles.items() if name in pairs}
+    arcs = [turn * float(np.linalg.norm(np.ptp(pairs[name].points, axis=0))) for name, turn in turns.items()]
+    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *arcs)
     if motion < min(float(facet_lengths(pair).min()) for pair in pairs.values()):
         return False
     load = problem.load_at(after.instant)
@@ -161,12 +159,9 @@ def _with_sums(substeps: list[StepResult]) -> StepResult:
     iterations = {**end.iterations, "substeps": [substep.load_factor for substep in substeps], "history": history}
     for name in ("geometry_updates", "active_set_iterations", "linear_iterations"):
         iterations[name] = sum(log[name] for log in logs)
-    contact = {
-        name: replace(
-            result,
-            dissipation=sum(substep.contact[name].dissipation for substep in substeps),
-            slip=np.sum([substep.contact[name].slip for substep in substeps], axis=0),
-        )
-        for name, result in end.contact.items()
-    }
+    contact = {}
+    for name, result in end.contact.items():
+        parts = [substep.contact[name] for substep in substeps]
+        slip = np.sum([part.slip for part in parts], axis=0)
+        contact[name] = replace(result, dissipation=sum(part.dissipation for part in parts), slip=slip)
     return replace(end, contact=contact, iterations=iterations)

@@ -97,13 +97,11 @@ def settle_heat(
     change, limit = np.inf, max(problem.criteria.max_geometry_updates, 1)
     for exchange in range(1, limit + 1):
         heat_solution = _steady_temperatures(problem, start, load, instant, equilibrium)
-        change = largest(heat_solution.rise - rise)
+        difference = heat_solution.rise - rise
+        change = largest(difference)
         settled = change <= tolerance * largest(heat_solution.rise) or not problem.model.expands
         negligible = max(tolerance * equilibrium.balance.largest, equilibrium.balance.noise)
-        if (
-            settled
-            or largest(problem.model.expansion_forces(problem.field, heat_solution.rise - rise).ravel()) <= negligible
-        ):
+        if settled or largest(problem.model.expansion_forces(problem.field, difference).ravel()) <= negligible:
             return replace(heat_solution, balance={**heat_solution.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, heat_solution.rise)
         equilibrium = solve(thermal_load(problem, load, rise), equilibrium)

@@ -48,14 +48,12 @@ class Tolerances:
         Largest relative residual of the first solution, unless the tolerance of the solver is larger [-].
     round_off : float
         Bound of the round-off of gaps [length].
-    expected : float
+    scale : float
         Scale of the displacements in the first step, if only forces act [length].
     """
 
-    def __init__(
-        self, solver: LinearSolver, criteria: Criteria, first: float, round_off: float, expected: float
-    ) -> None:
-        self._solver, self._criteria, self._round_off, self._expected = solver, criteria, round_off, expected
+    def __init__(self, solver: LinearSolver, criteria: Criteria, first: float, round_off: float, scale: float) -> None:
+        self._solver, self._criteria, self._round_off, self._first_scale = solver, criteria, round_off, scale
         self._residual = max(solver.tolerance, first)
 
     @property
@@ -82,7 +80,7 @@ class Tolerances:
         """
         relative_error = max(10 * self._solver.tolerance, self._residual if self._solver.iterative else 0.0)
         return Accuracy(
-            gap=max(relative_error * (scale or self._expected), self._round_off),
+            gap=max(relative_error * (scale or self._first_scale), self._round_off),
             multiplier=relative_error,
             residual=max(self._residual, self._solver.tolerance),
             max_iterations=1 if self.inexact else self._criteria.max_active_set_iterations,

@@ -204,9 +204,8 @@ def contact_work(
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
         displacement[pair.secondary.points] -= pair.rigid_motion(pair.node_candidates, configuration)
-    (work_after, energy_after), (work_before, energy_before) = (
-        forces.normal_work(other, displacement) for forces, other in ((after, before), (before, after))
-    )
+    work_after, energy_after = after.normal_work(before, displacement)
+    work_before, energy_before = before.normal_work(after, displacement)
     gained = work_after + work_before + energy_after - energy_before
     added_gap = np.where((after.pressing != 0.0) & (before.pressing != 0.0), after.added - before.added, 0.0)
     gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)

@@ -142,10 +142,8 @@ class Orthotropic(Material):
         if not nu_across > -1.0:
             raise ModelError(f"Poisson's ratio nu_across = {nu_across} must be above -1")
         G_across = E_across / (2.0 * (1.0 + nu_across))
-        return cls(
-            (E_along, E_across, E_across), (nu_along, nu_along, nu_across), (G_along, G_along, G_across), axes, density,
-            expansion,
-        )  # fmt: skip
+        E, nu, G = (E_along, E_across, E_across), (nu_along, nu_along, nu_across), (G_along, G_along, G_across)
+        return cls(E, nu, G, axes, density, expansion)
 
     @property
     def described(self) -> str:

@@ -44,10 +44,8 @@ class Stiffness:
 
     def absolute_product(self, u: Array) -> Array:
         """Return ``|K| |u|`` (n,), summed over the terms; the round-off of ``K u`` is proportional to it [force]."""
-        return sum(
-            (K.absolute_product(u) if hasattr(K, "absolute_product") else abs(K) @ np.abs(u) for K in self.terms),
-            np.zeros(u.shape),
-        )
+        products = (K.absolute_product(u) if hasattr(K, "absolute_product") else abs(K) @ np.abs(u) for K in self.terms)
+        return sum(products, np.zeros(u.shape))
 
 
 class ConstrainedMotion:
@@ -119,8 +117,8 @@ class System(ConstrainedMotion):
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
     relations : sequence of MultiPointConstraint
-    without_stiffness : ndarray of bool (n,), optional
-        Components that are unknowns although they have no stiffness, such as those of rigid obstacles; by default none.
+    without_stiffness : ndarray of bool (n,)
+        Components that are unknowns although they have no stiffness, such as those of rigid obstacles.
 
     Attributes
     ----------
@@ -137,14 +135,11 @@ class System(ConstrainedMotion):
     """
 
     def __init__(
-        self, K: bsr_array, supported: Mask, relations: Sequence[MultiPointConstraint] = (),
-        without_stiffness: Mask | None = None,
-    ) -> None:  # fmt: skip
+        self, K: bsr_array, supported: Mask, relations: Sequence[MultiPointConstraint], without_stiffness: Mask
+    ) -> None:
         R = stacked_rows(relations, K.shape[0])
         constrained = np.zeros(K.shape[0], bool)
         constrained[R.indices] = True
-        if without_stiffness is None:
-            without_stiffness = np.zeros(K.shape[0], bool)
         diagonal = K.diagonal()
         super().__init__(supported | ((diagonal == 0.0) & ~constrained & ~without_stiffness), relations)
         self._reacting: Mask = self.fixed | constrained  # supports and constraints may exert forces here

@@ -119,6 +119,10 @@ def initial_state(
     return state
 
 
+# Initial states with their multipliers.
+ScaledStates = Sequence[tuple[float, InitialState]]
+
+
 @dataclass(frozen=True, eq=False)
 class StressOffset:
     """Stress in addition to that caused by displacements, due to temperature, initial strains and initial stresses.
@@ -135,7 +139,7 @@ class StressOffset:
 
     rise: Array
     expansion: Array
-    states: Sequence[tuple[float, InitialState]] = ()
+    states: ScaledStates = ()
 
     def sum_of_states(self, kind: str, element: str, rows: Indices, N: Array) -> Array | None:
         """Return the sum of initial stresses [pressure] or strains [-], (n_rows, n, n_components); None if there are none.

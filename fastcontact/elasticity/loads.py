@@ -156,13 +156,18 @@ class Hydrostatic:
 
 
 @dataclass(frozen=True)
-class Traction(Load):
-    """A force per unit area on a group of facets, given by its components [pressure]."""
+class ComponentLoad(Load):
+    """Base class of loads with components on a group."""
 
-    KIND = "the traction"
     group: str
     components: Components
     ramp: Table | None = None
+
+
+class Traction(ComponentLoad):
+    """A force per unit area on a group of facets, given by its components [pressure]."""
+
+    KIND = "the traction"
 
 
 class VolumeLoad(Load):
@@ -198,14 +203,10 @@ class BodyForce(VolumeLoad):
     ramp: Table | None = None
 
 
-@dataclass(frozen=True)
-class NodalForce(Load):
+class NodalForce(ComponentLoad):
     """A force on each node of a group, given by its components [force]."""
 
     KIND = "the nodal force"
-    group: str
-    components: Components
-    ramp: Table | None = None
 
     def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "no force can act on it")
@@ -223,14 +224,11 @@ class NodalForce(Load):
             forces[nodes, axis] = evaluated(value, mesh.points[nodes], self.name)
 
 
-@dataclass(frozen=True)
-class TotalForce(Load):
+class TotalForce(ComponentLoad):
     """A force given by its components [force], which acts as a uniform traction on a group of facets."""
 
     KIND, CONSTANT = "the total force", True
-    group: str
     components: Mapping[int, float]
-    ramp: Table | None = None
 
     def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         super()._check_groups(mesh, kinematics)

@@ -123,10 +123,8 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
     Raises ModelError if a function returns an array of a different shape or vectors that are not orthonormal, or if the line
     of cylindrical axes is not the axis of symmetry of an axisymmetric model.
     """
-    if axes is None:
-        return np.broadcast_to(np.eye(3), (len(points), 3, 3))
     if not callable(axes):
-        return np.broadcast_to(np.array(axes), (len(points), 3, 3))
+        return np.broadcast_to(np.eye(3) if axes is None else np.array(axes), (len(points), 3, 3))
     if kinematics == "axisymmetric" and isinstance(axes, CylindricalAxes) and not axes.around_y:
         raise ModelError(
             f"{axes} are not about the axis of symmetry: in axisymmetry their origin is (0, 0, 0) and their direction "

@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray, Array, Mask, Numbers
 from fastcontact.elasticity.incompatible_modes import MODES
-from fastcontact.elasticity.initial_states import InitialState, StressOffset
+from fastcontact.elasticity.initial_states import ScaledStates, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
 from fastcontact.elasticity.varying_constants import centre_weights, positions
 from fastcontact.mesh import elements
@@ -128,9 +128,7 @@ class MaterialField:
             values[evaluation.rows] = evaluate(evaluation.points, self.kinematics, evaluation.constants)
         return values
 
-    def offset(
-        self, rise: Array | None, states: Sequence[tuple[float, InitialState]] = (), n_points: int = 0
-    ) -> StressOffset | None:
+    def offset(self, rise: Array | None, states: ScaledStates = (), n_points: int = 0) -> StressOffset | None:
         """Return the stress due to temperatures and initial states; None if there are neither.
 
         Parameters
@@ -150,10 +148,8 @@ class MaterialField:
     def n_cells_without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return the number of cells of materials without expansion whose `rise` (n_points,) [temperature] is not zero."""
         no_expansion = np.isnan(self.expansion[:, 0])
-        return sum(
-            int(np.count_nonzero(no_expansion[self.rows[name]] & (rise[block] != 0.0).any(axis=1)))
-            for name, block in mesh.solids.items()
-        )
+        heated = {name: (rise[block] != 0.0).any(axis=1) for name, block in mesh.solids.items()}
+        return sum(int(np.count_nonzero(no_expansion[self.rows[name]] & heated[name])) for name in heated)
 
     @cached_property
     def distinct(self) -> dict[str, Numbers]:
@@ -210,9 +206,8 @@ def material_field(
             at_points = add(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
             rows_at_points[name][cells] = at_points.reshape(len(cells), len(N))
     all_moduli, owners = np.concatenate(moduli), np.concatenate(owner)
-    return MaterialField(
-        materials, kinematics, all_moduli, evaluations, owners, dict(material_numbers), rows, rows_at_points
-    )
+    numbers = dict(material_numbers)
+    return MaterialField(materials, kinematics, all_moduli, evaluations, owners, numbers, rows, rows_at_points)
 
 
 def _law_key(material: Material, moduli: Array) -> tuple[object, ...]:

@@ -258,10 +258,9 @@ class NonlinearBodies:
         except ConvergenceError:
             return 0.0, 0.0
         twice_shear = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # in the norm of a tensor
-        stress, halved_stress = (
-            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in flowing.items()])
-            for response in (bodies, halved_bodies)
-        )
+        stresses = (bodies.stress, halved_bodies.stress)
+        parts = [[(s[name][points] * twice_shear).ravel() for name, points in flowing.items()] for s in stresses]
+        stress, halved_stress = map(np.concatenate, parts)
         return float(np.linalg.norm(stress)), float(np.linalg.norm(halved_stress - stress))
 
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
@@ -337,13 +336,6 @@ def field_names(materials: Sequence[Material], strain: str) -> tuple[str, ...]:
     """Return the names of the cell fields for given materials and strains; there are none for linear bodies."""
     plastic = ("plastic_strain", "yield_ratio") if any(isinstance(law, ElasticPlastic) for law in materials) else ()
     return (*(("J", "logarithmic_strain") if strain == "finite" else ()), *plastic)
-
-
-def nonlinear_bodies(mesh: Mesh, kinematics: str, strain: str, field: MaterialField) -> NonlinearBodies | None:
-    """Return the solid cells as nonlinear bodies; None if they are linear."""
-    if strain == "small" and not any(isinstance(law, NonlinearElastic) for law in field.materials):
-        return None
-    return NonlinearBodies(mesh, kinematics, strain, field)
 
 
 def check_law(law: Material, strain: str) -> None:

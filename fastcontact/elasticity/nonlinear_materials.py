@@ -17,7 +17,7 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.elasticity.constitutive_kernels import INVARIANTS, OGDEN, PLASTIC
-from fastcontact.elasticity.materials import NEARLY_INCOMPRESSIBLE, Constant, LinearElastic, check_positive
+from fastcontact.elasticity.materials import Constant, LinearElastic, check_positive
 from fastcontact.errors import ModelError
 
 STRAINS = ("small", "finite")
@@ -47,8 +47,7 @@ class NonlinearElastic(LinearElastic):
     @property
     def averaged(self) -> bool:  # type: ignore[override]
         """Whether elements that support a mean dilatation use it, except in plane stress."""
-        nearly_incompressible = "small" in self.strains or self.nu >= NEARLY_INCOMPRESSIBLE
-        return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly_incompressible)
+        return super().averaged or (self.volumetric == "auto" and "small" in self.strains)
 
     @property
     def constants(self) -> list[float]:

@@ -26,6 +26,7 @@ __all__ = [
 ]  # fmt: skip
 
 Materials = dict[str, Numbers]
+Location = tuple[str, Array, Indices]  # type of the cells, reference coordinates of points, and rows of the cells
 # Memory for the stresses of the cells that are processed together [bytes].
 BATCH = 16_000_000
 # The distribution of node numbers is estimated from one of SAMPLING_INTERVAL cells.
@@ -148,9 +149,7 @@ class CellStress:
         )  # fmt: skip
 
     @staticmethod
-    def _stress_free_strain(
-        offset: StressOffset, location: tuple[str, Array, Indices], cells: Numbers, material: Numbers
-    ) -> Array:
+    def _stress_free_strain(offset: StressOffset, location: Location, cells: Numbers, material: Numbers) -> Array:
         """Return the sum of thermal and initial strains (n_cells, n, n_components) [-]."""
         name, xi, rows = location
         N = elements.get(name).shape(xi)
@@ -163,7 +162,7 @@ class CellStress:
         return strain if initial is None else strain + initial
 
     def _add_offset(
-        self, offset: StressOffset, location: tuple[str, Array, Indices], cells: Numbers, material: Numbers, out: Array
+        self, offset: StressOffset, location: Location, cells: Numbers, material: Numbers, out: Array
     ) -> None:
         """Add initial stresses, and subtract the stresses of the stress-free strains, whose dilatation is projected."""
         name, xi, rows = location

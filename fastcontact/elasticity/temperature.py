@@ -8,17 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.elasticity.loads import (
-    EVERYWHERE,
-    Table,
-    Value,
-    check_number,
-    check_solids,
-    check_value,
-    evaluated,
-    listed,
-    solid_points,
-)
+from fastcontact.elasticity import loads
+from fastcontact.elasticity.loads import Table, Value, check_number, check_value, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 
@@ -53,16 +44,16 @@ class Temperature:
     @property
     def name(self) -> str:
         """Text with the groups, for messages."""
-        return f"the temperature of {listed(self.groups)}"
+        return f"the temperature of {loads.listed(self.groups)}"
 
     @property
     def group_names(self) -> tuple[str, ...]:
         """Names of the groups."""
-        return (EVERYWHERE,) if self.groups is None else self.groups
+        return (loads.EVERYWHERE,) if self.groups is None else self.groups
 
     def check(self, mesh: Mesh) -> None:
         """Raise MeshError or ModelError if a group, the value or the reference is not admissible."""
-        check_solids(mesh, self.groups, ": it has no temperature")
+        loads.check_solids(mesh, self.groups, ": it has no temperature")
         check_number(f"the reference of {self.name}", self.reference)
         if not isinstance(self.value, np.ndarray):
             check_value(self.name, self.value)
@@ -76,7 +67,7 @@ class Temperature:
 
     def rise(self, mesh: Mesh) -> Array:
         """Return the rise above the reference (n_points,) [temperature] at multiplier 1; it is zero outside the groups."""
-        points = solid_points(mesh, self.groups)
+        points = loads.solid_points(mesh, self.groups)
         rise = np.zeros(mesh.n_points)
         if isinstance(self.value, np.ndarray):
             rise[points] = self.value[points] - self.reference

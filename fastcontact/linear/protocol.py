@@ -11,7 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, TypeAlias, runtime_checkable
 
 from scipy.sparse import bsr_array, csr_array
 
@@ -36,6 +36,9 @@ class Product(Protocol):
 
     def absolute_product(self, u: Array) -> Array:
         """Return ``abs(K) @ abs(u)`` (n,) [force]."""
+
+
+Matrix: TypeAlias = bsr_array | Product
 
 
 @dataclass
@@ -221,16 +224,14 @@ class LinearSolver(Protocol):
         """Whether `prepare` has condensed K statically to the `involved` unknowns."""
         return False
 
-    def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
-    ) -> bsr_array | Product:
+    def prepare(self, K: bsr_array, modes: Array, involved: Indices | None = None, release: bool = False) -> Matrix:
         """Factorise the matrix, or build a multigrid hierarchy.
 
         Parameters
         ----------
         K : bsr_array (n, n)
             Symmetric positive definite matrix [force / length].
-        rigid_modes : ndarray (n, n_modes)
+        modes : ndarray (n, n_modes)
             Rigid-body modes, which span the near null space of K [length].
         involved : ndarray of int (k,), optional
             Unknowns that may occur in equations, which solvers may use to save work. By default, all unknowns may occur.

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.elasticity.loads import Load, Table, Traction, check_number, check_points
+from fastcontact.elasticity.loads import ComponentLoad, Load, Table, Traction, check_number, check_points
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError, check_known
 from fastcontact.linear.sparse_rows import nodal_rows
@@ -158,15 +158,11 @@ class SpreadForce(Load):
         forces[points] += nodal
 
 
-@dataclass(frozen=True)
-class Moment(Load):
+class Moment(ComponentLoad):
     """Components of a moment [force times length] about the axes, on a reference point or distributed over a group."""
 
-    KIND = "the moment"
-    CONSTANT = True
-    group: str
+    KIND, CONSTANT = "the moment", True
     components: Mapping[int, float]
-    ramp: Table | None = None
 
     def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":

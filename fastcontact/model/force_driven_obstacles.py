@@ -22,7 +22,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.ramp import PartHistory, Table
-from fastcontact.model.rigid_motions import FreeMotions, Label
+from fastcontact.model.rigid_motions import FreeMotions
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +115,8 @@ class ForceDrivenObstacles:
             return motions
         free = np.flatnonzero(self.without_stiffness)
         n_points, dim = self.shape
-        labels = [
-            Label(f"obstacle '{self.pairs[dof // dim - n_points].name}'", f"translation along {'xyz'[dof % dim]}")
-            for dof in free.tolist()
-        ]
-        return motions.with_translations(free, labels, self.n_dofs)
+        names = [f"obstacle '{self.pairs[dof // dim - n_points].name}'" for dof in free.tolist()]
+        return motions.with_translations(free, names, (self.n_dofs // dim, dim))
 
     def near_nullspace(self, modes: Array) -> Array:
         """Return the near null space (n_dofs, k): `modes`, translations first, extended to the obstacles."""

@@ -76,17 +76,15 @@ LAWS = {
 CHOICES = {"initiation": ("bk", "quadratic", "maximum"), "mixed_mode": ("bk", "power")}
 
 
-def pair_options(
-    name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, *, against_obstacle: bool
-) -> PairOptions:
+def pair_options(name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, has_obstacle: bool) -> PairOptions:
     """Return the options of contact pair `name` with the secondary `side`, converted for formulations.
 
     `mesh` contains the groups that options name. Raises ContactError or ModelError if an option is invalid; the message names
     the pair.
     """
-    if against_obstacle and "clearance_primary" in options:
+    if has_obstacle and "clearance_primary" in options:
         raise ContactError(f"a rigid obstacle has no 'clearance_primary': give contact '{name}' a 'clearance'")
-    _check_obstacle_temperature(name, options, against_obstacle)
+    _check_obstacle_temperature(name, options, has_obstacle)
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
     table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
@@ -97,7 +95,7 @@ def pair_options(
         excluded=_group_mask(name, "excluded", options, mesh, side),
         frictionless=_group_mask(name, "frictionless", options, mesh, side),
         frictionless_along=_vector(name, "frictionless_along", options, mesh.dim),
-        kind=_kind(name, options, against_obstacle),
+        kind=_kind(name, options, has_obstacle),
         penalty=_penalty(name, options),
         tangential_penalty=_tangential_penalty(name, options.get("tangential_penalty")),
         search_distance=_positive(name, "search_distance", options, "any distance"),
@@ -146,7 +144,7 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     return law
 
 
-def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
+def _kind(name: str, options: Mapping[str, Any], has_obstacle: bool) -> str:
     """Return the kind of contact, after checks for contradicting options."""
     kind = options.get("kind", "unilateral")
     check_known(f"kind of contact '{name}'", kind, KINDS, ContactError)
@@ -156,7 +154,7 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
         raise ContactError(f"contact '{name}' has a tangential_penalty, but no friction that it could soften")
     if kind == "gap_only" and "penalty" in options:
         raise ContactError(f"contact '{name}' is gap_only, which has no forces: leave out 'penalty' or 'kind'")
-    if kind == "tied" and against_obstacle:
+    if kind == "tied" and has_obstacle:
         raise ContactError(
             f"contact '{name}' cannot be tied to a rigid obstacle: prescribe the displacements of the group, or couple them"
         )
@@ -182,17 +180,17 @@ def _positive(name: str, option: str, options: Mapping[str, Any], default: str) 
     return float(value)
 
 
-def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_obstacle: bool) -> None:
+def _check_obstacle_temperature(name: str, options: Mapping[str, Any], has_obstacle: bool) -> None:
     """Raise ContactError for heat flow to an obstacle of unknown temperature, or a temperature without an obstacle."""
     temperature = options.get("obstacle_temperature")
     if temperature is None:
-        if against_obstacle and {"conductance", "friction_heat"} & set(options):
+        if has_obstacle and {"conductance", "friction_heat"} & set(options):
             raise ContactError(
                 f"heat flow through contact '{name}' needs the temperature of its obstacle: give it obstacle_temperature=..."
             )
         return
     check_number(f"the obstacle_temperature of contact '{name}'", temperature)
-    if not against_obstacle:
+    if not has_obstacle:
         raise ContactError(f"contact '{name}' has an obstacle_temperature, but no obstacle: use fix_temperature")
     if options.get("conductance") is None:
         raise ContactError(f"contact '{name}' has an obstacle_temperature, but no conductance to the obstacle")

@@ -219,6 +219,14 @@ def ramp_of(steps: RampLike | None) -> Ramp:
     return Ramp(tuple(values), ((0.0, 0.0), (end, end)))
 
 
+def sums_by_ramp(items: Iterable[tuple[Table | None, Array]]) -> dict[Table | None, Array]:
+    """Return the sums of arrays with the same history, given as pairs of history and array."""
+    sums: dict[Table | None, Array] = {}
+    for table, values in items:
+        sums[table] = sums.get(table, 0.0) + values
+    return sums
+
+
 def multiplier(table: PartHistory, ramp: Ramp, instant: float) -> float:
     """Return the multiplier [-] at `instant` of an item with the history `table`, or that of the ramp if `table` is None."""
     if isinstance(table, Harmonic):

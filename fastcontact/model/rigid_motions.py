@@ -72,10 +72,15 @@ class FreeMotions:
         """Return the motions ``displacement @ coefficients``, coefficients (k, j)."""
         return replace(self, displacement=self.displacement @ coefficients, weights=self.weights @ coefficients)
 
-    def with_translations(self, dofs: Indices, labels: Sequence[Label], n_dofs: int) -> FreeMotions:
-        """Return these motions, and a unit displacement along each of the components `dofs` (j,) of `n_dofs`."""
+    def with_translations(self, dofs: Indices, names: Sequence[str], shape: tuple[int, ...]) -> FreeMotions:
+        """Return these motions, and a unit displacement along each of the components `dofs` (j,) of `shape` (n_nodes, dim).
+
+        `names` are those of the points or obstacles that move.
+        """
         k, j = len(self), len(dofs)
-        displacement = np.zeros((n_dofs, k + j))
+        axes = ("xyz"[dof % shape[1]] for dof in dofs)
+        labels = [Label(name, f"translation along {axis}") for name, axis in zip(names, axes, strict=True)]
+        displacement = np.zeros((shape[0] * shape[1], k + j))
         displacement[: len(self.displacement), :k] = self.displacement
         displacement[dofs, k + np.arange(j)] = 1.0
         weights = np.asarray(block_diag(self.weights, np.eye(j)), float)
@@ -189,11 +194,8 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     without_body = bodies(mesh)[1][relations.indices // mesh.dim] < 0
     points = np.unique(relations.indices[without_body & ~fixed.ravel()[relations.indices]])
     names = {int(members[0]): f"'{name}'" for name, members in mesh.point_groups.items() if len(members) == 1}
-    labels = [
-        Label(f"point {names.get(int(dof) // mesh.dim, dof // mesh.dim)}", f"translation along {'xyz'[dof % mesh.dim]}")
-        for dof in points
-    ]
-    motions = motions.with_translations(points, labels, mesh.points.size)
+    texts = [f"point {names.get(int(dof) // mesh.dim, dof // mesh.dim)}" for dof in points]
+    motions = motions.with_translations(points, texts, mesh.points.shape)
     if not relations.shape[0] or not len(motions):
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
@@ -214,10 +216,8 @@ def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
         if free.shape[1]:
             matrices.append(free)
             name, centre = _part_name(mesh, body_parts, number), mesh.points[members].mean(axis=0)
-            labels += [
-                Label(name, motion, centre if motion.startswith("rotation") else None, float(arm))
-                for motion, arm in zip(MODE_NAMES[kinematics], arms, strict=True)
-            ]
+            modes_and_arms = zip(MODE_NAMES[kinematics], arms.tolist(), strict=True)
+            labels += [Label(name, m, centre if m.startswith("rotation") else None, arm) for m, arm in modes_and_arms]
     combinations = _joint_motions(mesh, body_parts, part_motions)
     coefficients = np.split(combinations, np.cumsum([motion.shape[2] for _, motion in part_motions]))
     displacement = np.zeros((mesh.n_points, mesh.dim, combinations.shape[1]))

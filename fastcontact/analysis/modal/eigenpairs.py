@@ -99,9 +99,8 @@ def _lanczos_vectors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, sta
     try:
         return np.asarray(eigsh(shifted, n, M, sigma=0.0, OPinv=inverse, v0=loaded.full_solution(M @ start))[1])
     except ArpackNoConvergence as error:
-        raise ConvergenceError(
-            f"Lanczos iterations found {len(error.eigenvalues)} of {n} modes: request fewer"
-        ) from error
+        found = len(error.eigenvalues)
+        raise ConvergenceError(f"Lanczos iterations found {found} of {n} modes: request fewer") from error
 
 
 def _lobpcg_vectors(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:

@@ -124,12 +124,11 @@ class Modes(Shapes):
     def _rigid(self) -> Mask:
         """Whether each mode (n,) moves the bodies like rigid bodies."""
         parts, rigid = rigid_parts(self._model.mesh), np.ones(len(self), bool)
+        size = np.linalg.norm(self.shapes, axis=(1, 2))
         for nodes in map(parts.nodes_of, range(parts.count)):
             basis = np.linalg.qr(rigid_modes(self._model.mesh.points[nodes], self._model.kinematics))[0]
             u = self.shapes[:, nodes].reshape(len(self), -1).T
-            rigid &= np.linalg.norm(u - basis @ (basis.T @ u), axis=0) < NOTABLE * np.linalg.norm(
-                self.shapes, axis=(1, 2)
-            )
+            rigid &= np.linalg.norm(u - basis @ (basis.T @ u), axis=0) < NOTABLE * size
         return rigid
 
     def remarks(self) -> list[str]:

@@ -146,10 +146,8 @@ class MovingContact:
         if not self._is_consistent(0.5 * (derivatives[0] + derivatives[1]), dofs):
             derivatives = self._differences([np.array([dof]) for dof in dofs])
         along_lifts = [self._one_sided(lift / (largest(lift) or 1.0)) for lift in lifts]
-        forward, backward = (
-            csr_array(hstack([of_unknowns, *(csr_array(columns[side][:, None]) for columns in along_lifts)]))
-            for side, of_unknowns in enumerate(derivatives)
-        )
+        columns = [[csr_array(pair[side][:, None]) for pair in along_lifts] for side in (0, 1)]
+        forward, backward = (csr_array(hstack([D, *added])) for D, added in zip(derivatives, columns, strict=True))
         return forward, backward
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:

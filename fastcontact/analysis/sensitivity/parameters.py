@@ -39,19 +39,18 @@ def _constant_derivatives(contact: MovingContact, parameter: Label) -> Change:
 
     def with_increment(increment: float) -> MovingContact:
         changed_model, problem = copy.copy(model), contact.problem
-        changed_model.materials = [
-            (_with_constant(m, name, component, increment) if i == number else m, groups)
-            for i, (m, groups) in enumerate(model.materials)
-        ]
+        changed_model.materials = list(model.materials)
+        groups = model.materials[number][1]
+        changed_model.materials[number] = _with_constant(material, name, component, increment), groups
         pairs = {p.name: changed_model.bind(p, problem.pairs[p.name].held_motions) for p in changed_model.contact}
         return replace(contact, problem=replace(problem, model=changed_model, pairs=pairs))
 
     # Central differences with an error of fourth order in the step.
-    differences = [
-        weight * (_internal_forces(with_increment(h)) - _internal_forces(with_increment(-h)))
-        for h, weight in ((step, 8.0), (2 * step, -1.0))
-    ]
-    change = replace(_zero_change(contact), residual=(differences[0] + differences[1]) / (12.0 * step))
+    def difference(h: float) -> Array:
+        return _internal_forces(with_increment(h)) - _internal_forces(with_increment(-h))
+
+    residual = (8.0 * difference(step) - difference(2 * step)) / (12.0 * step)
+    change = replace(_zero_change(contact), residual=residual)
     if not contact.problem.pairs:
         return change
     return replace(change, sample=contact.parameter_derivative(with_increment, step))

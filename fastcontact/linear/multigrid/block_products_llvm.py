@@ -75,9 +75,7 @@ def _product_adder(index: Callable[[int, int, int, int], int], to: Any, left: An
         write, pieces = _Writer(context, builder, signature.args[0].dtype), _pieces(n)
         out, right = (write.start(signature.args[number], args[number]) for number in (0, 4))
         left = write.starts(signature.args[2], args[2])
-        rows_of_right = [
-            [write.load([right], args[5], t * n + piece.column, piece.width) for piece in pieces] for t in range(k)
-        ]
+        rows_of_right = [[write.load([right], args[5], t * n + p.column, p.width) for p in pieces] for t in range(k)]
         for r in range(m):
             factors = [write.load(left, args[3], index(r, t, m, k), 1) for t in range(k)]
             for p, piece in enumerate(pieces):
@@ -183,10 +181,8 @@ class _Row(_Writer):
         self.data = self.starts(signature.args[1], args[1])
         self.shifted = self.n == 3 and self.m > 1
         self.pieces = [Piece(0, WIDTH, 3)] if self.shifted else _pieces(self.n)
-        self.totals = [
-            [cgutils.alloca_once_value(builder, self.zeros(piece.width)) for piece in self.pieces]
-            for _ in range(self.m)
-        ]
+        zeros = [self.zeros(piece.width) for piece in self.pieces]
+        self.totals = [[cgutils.alloca_once_value(builder, zero) for zero in zeros] for _ in range(self.m)]
 
     def add_block(self, k: Any) -> None:
         """Add the product of block `k` with its part of x."""

@@ -23,14 +23,7 @@ from scipy.sparse import csr_matrix
 from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
-from fastcontact.linear.multigrid.level import (
-    COARSEST_SIZE,
-    SAFETY_FACTOR,
-    CoarseLevel,
-    Level,
-    chebyshev,
-    largest_eigenvalue,
-)
+from fastcontact.linear.multigrid.level import COARSEST_SIZE, SAFETY_FACTOR, CoarseLevel, Level, chebyshev
 from fastcontact.linear.multigrid.matrix import ALL_BLOCKS, BlockMatrix, pointers
 
 
@@ -94,7 +87,7 @@ class Hierarchy:
         inverse = np.empty_like(diagonal)
         cycle_kernels.invert_blocks(diagonal, size, inverse)
         level = Level(matrix, diagonal, inverse, 1.0)
-        level.bound = SAFETY_FACTOR * largest_eigenvalue(level)
+        level.bound = SAFETY_FACTOR * level.largest_eigenvalue()
         return level
 
     def _coarsen(
@@ -165,7 +158,7 @@ class Hierarchy:
         If `estimated` is true, bounds are also estimated for the current matrices, and used if they are larger.
         """
         self.bounds = [
-            max(bound, SAFETY_FACTOR * largest_eigenvalue(level)) if estimated and level.P is not None else bound
+            max(bound, SAFETY_FACTOR * level.largest_eigenvalue()) if estimated and level.P is not None else bound
             for level, bound in zip(self.levels, self._free_bounds, strict=True)
         ]
 

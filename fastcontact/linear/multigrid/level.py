@@ -129,10 +129,8 @@ class Level:
             self.eliminated.move_forces(r)
         if self.springs is not None:
             self.springs.subtract_forces(x, r)
-        if self.change is not None:
-            parallel_for(
-                cycle_kernels.subtract_rows, len(self.change[0]), self.A.work_of_row, *self.change, x, r, self.A.rows
-            )
+        if (change := self.change) is not None:
+            parallel_for(cycle_kernels.subtract_rows, len(change[0]), self.A.work_of_row, *change, x, r, self.A.rows)
 
     def restrict(self, coarse: AnyArray) -> None:
         """Fill `coarse`, the right-hand side of the next coarser level, with the restricted residual; `r` may be changed."""
@@ -154,6 +152,42 @@ class Level:
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
 
+    def largest_eigenvalue(self) -> float:
+        """Return an estimate of the largest eigenvalue of ``D^-1 A`` from below, by the Lanczos method.
+
+        The tridiagonal matrix of the Lanczos method follows from the coefficients of the conjugate gradient method with the
+        preconditioner D (Golub and Van Loan, Matrix Computations, 2013, section 11.3).
+        """
+        r = np.random.default_rng(0).normal(size=self.n).astype(self.b.dtype)
+        z, q, p = np.empty_like(r), np.empty_like(r), np.zeros_like(r)
+        scratch, zero = np.empty_like(r), np.zeros_like(r)
+        if self.eliminated is not None:
+            self.eliminated.move_forces(r)
+        diagonal, off_diagonal = [], []
+        old_alpha, beta, rz = 1.0, 0.0, 0.0
+        real = r.dtype.type
+        for step in range(min(LANCZOS_STEPS, self.n)):
+            self.chebyshev_step(r, real(0), real(1), scratch, z, True)
+            if self.free_motions is not None:
+                self.free_motions.correct(r, 1.0, scratch, z)
+            if self.eliminated is not None:
+                self.eliminated.complete(z)
+            new_rz = float(r @ z)
+            if not new_rz > ROUND_OFF * abs(rz):
+                break
+            beta = new_rz / rz if step else 0.0
+            rz = new_rz
+            p = z + real(beta) * p
+            self.subtract_product(p, zero, q)
+            q *= -1
+            alpha = rz / float(p @ q)
+            diagonal.append(1 / alpha + beta / old_alpha)
+            off_diagonal.append(np.sqrt(beta) / old_alpha)
+            r -= real(alpha) * q
+            old_alpha = alpha
+        T = np.diag(diagonal) + np.diag(off_diagonal[1:], 1) + np.diag(off_diagonal[1:], -1)
+        return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0
+
     @property
     def nbytes(self) -> int:
         """Memory of the level [bytes]."""
@@ -174,43 +208,6 @@ def chebyshev(bound: float, degree: int = DEGREE) -> list[tuple[float, float]]:
         factors.append((new_rho * rho, 2.0 * new_rho / half_width))
         rho = new_rho
     return factors
-
-
-def largest_eigenvalue(level: Level) -> float:
-    """Return an estimate of the largest eigenvalue of ``D^-1 A`` from below, by the Lanczos method.
-
-    The tridiagonal matrix of the Lanczos method follows from the coefficients of the conjugate gradient method with the
-    preconditioner D (Golub and Van Loan, Matrix Computations, 2013, section 11.3).
-    """
-    r = np.random.default_rng(0).normal(size=level.n).astype(level.b.dtype)
-    z, q, p = np.empty_like(r), np.empty_like(r), np.zeros_like(r)
-    scratch, zero = np.empty_like(r), np.zeros_like(r)
-    if level.eliminated is not None:
-        level.eliminated.move_forces(r)
-    diagonal, off_diagonal = [], []
-    old_alpha, beta, rz = 1.0, 0.0, 0.0
-    real = r.dtype.type
-    for step in range(min(LANCZOS_STEPS, level.n)):
-        level.chebyshev_step(r, real(0), real(1), scratch, z, True)
-        if level.free_motions is not None:
-            level.free_motions.correct(r, 1.0, scratch, z)
-        if level.eliminated is not None:
-            level.eliminated.complete(z)
-        new_rz = float(r @ z)
-        if not new_rz > ROUND_OFF * abs(rz):
-            break
-        beta = new_rz / rz if step else 0.0
-        rz = new_rz
-        p = z + real(beta) * p
-        level.subtract_product(p, zero, q)
-        q *= -1
-        alpha = rz / float(p @ q)
-        diagonal.append(1 / alpha + beta / old_alpha)
-        off_diagonal.append(np.sqrt(beta) / old_alpha)
-        r -= real(alpha) * q
-        old_alpha = alpha
-    T = np.diag(diagonal) + np.diag(off_diagonal[1:], 1) + np.diag(off_diagonal[1:], -1)
-    return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0
 
 
 class CoarseLevel:

@@ -28,7 +28,7 @@ from fastcontact.linear.factor_solver import MAX_FACTORISED_DOFS
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import ReducedOperator
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid, StallError, TooManyIterationsError
-from fastcontact.linear.protocol import TOLERANCE, LinearSolver, Loaded, Product
+from fastcontact.linear.protocol import TOLERANCE, LinearSolver, Loaded, Matrix
 from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
@@ -72,11 +72,9 @@ class Amg(Multigrid, LinearSolver):
         """Whether a solution with a larger tolerance costs less; true until a factorisation has replaced multigrid."""
         return self.replacement is None
 
-    def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
-    ) -> bsr_array | Product:
+    def prepare(self, K: bsr_array, modes: Array, involved: Indices | None = None, release: bool = False) -> Matrix:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        self.build(K, rigid_modes, release)
+        self.build(K, modes, release)
         self._involved, self.replacement, self._factor_solver, self.replacement_reason = involved, None, None, ""
         return self.K if release else K
 

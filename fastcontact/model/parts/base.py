@@ -19,7 +19,7 @@ from fastcontact.elasticity.loads import Load, Value, check_number, check_solids
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import KINEMATICS, Material
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies, check_law, field_names, nonlinear_bodies
+from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies, check_law, field_names
 from fastcontact.elasticity.nonlinear_materials import STRAINS, NonlinearElastic
 from fastcontact.elasticity.springs import Springs
 from fastcontact.elasticity.stiffness import stiffness
@@ -35,6 +35,9 @@ from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import Harmonic, PartHistory, Table, interpolation_tables
 from fastcontact.round_off import LENGTH_ROUND_OFF
+
+# Names of groups; None means all solid cells.
+Groups = Sequence[str] | str | None
 
 
 def displacement_name(kind: str, group: str) -> str:
@@ -93,7 +96,7 @@ class Support:
         return values
 
 
-def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
+def group_names(groups: Groups) -> tuple[str, ...] | None:
     """Return the names of groups as a tuple, or None, which stands for all cells."""
     if groups is None:
         return None
@@ -156,7 +159,7 @@ class ModelBase(NameSuggestions):
         """Number of displacement components of all points."""
         return self.mesh.n_points * self.mesh.dim
 
-    def _solid_groups(self, groups: Sequence[str] | str | None, consequence: str) -> tuple[str, ...] | None:
+    def _solid_groups(self, groups: Groups, consequence: str) -> tuple[str, ...] | None:
         """Return the names of groups of solid cells, or None for all cells.
 
         Raises a ModelError whose message ends with `consequence` if a group contains no solid cell.
@@ -212,7 +215,7 @@ class ModelBase(NameSuggestions):
         """
         return stacked_rows([*self.relations, *self.springs], self.n_dofs)
 
-    def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
+    def add_material(self, material: Material, groups: Groups = None) -> None:
         """Assign a material to groups of solid cells.
 
         Parameters
@@ -253,7 +256,7 @@ class ModelBase(NameSuggestions):
 
     def nonlinear_bodies(self, field: MaterialField) -> NonlinearBodies | None:
         """Return the solid cells as nonlinear bodies with the materials of `field`; None if the bodies are linear elastic."""
-        return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
+        return NonlinearBodies(self.mesh, self.kinematics, self.strain, field) if self.nonlinear else None
 
     def refuse_nonlinear(self, feature: str) -> None:
         """Raise ModelError if bodies are nonlinear. The message begins with `feature`, for example "sensitivities are"."""

@@ -446,12 +446,10 @@ class ModelConnections(ModelInitialStates):
         >>> model.add_spring("TOP_LEFT", "BOTTOM_RIGHT", axial=50.0)
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
-        stiffness = {"axial": axial, "transverse": transverse}
+        stiffness, dim = {"axial": axial, "transverse": transverse}, self.mesh.dim
         along_line = {key: value for key, value in stiffness.items() if value is not None}
         vector = self._direction(name, along_line, to is not None, direction)
-        along_axes = (
-            {} if along_line and {*components.values()} <= {None} else axis_values(name, components, self.mesh.dim)
-        )
+        along_axes = {} if along_line and {*components.values()} <= {None} else axis_values(name, components, dim)
         for value in [*along_axes.values(), *along_line.values()]:
             check_number(f"the stiffness of {name}", value)
             if not value > 0:
@@ -463,7 +461,7 @@ class ModelConnections(ModelInitialStates):
         if opposite is None:
             if translation is not None:
                 raise ModelError(f"{name} acts on the ground: leave out the translation, or name the second group")
-            self.springs.append(ground_springs(name, nodes, along_axes, self.n_dofs, self.mesh.dim, along_line, vector))
+            self.springs.append(ground_springs(name, nodes, along_axes, self.n_dofs, dim, along_line, vector))
             return
         if len(nodes) > 1 < len(opposite):
             match = matching_nodes(self.mesh, (str(group), nodes), (str(to), opposite), translation)

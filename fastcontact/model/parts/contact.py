@@ -416,13 +416,11 @@ class ModelContact(ModelConnections):
             check_known(f"option of {pair.formulation}", option, available, ContactError)
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
-        ends = [
-            (interface.first, interface.second, np.eye(self.mesh.dim) if interface.turn is None else interface.turn)
-            for interface in self.periodic_interfaces
-        ]
+        unit = np.eye(self.mesh.dim)
+        ends = [(i.first, i.second, unit if i.turn is None else i.turn) for i in self.periodic_interfaces]
         secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
         has_obstacle = pair.obstacle is not None
-        options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=has_obstacle)
+        options = pair_options(pair.name, pair.options, self.mesh, secondary, has_obstacle)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
             if not kind.allows_obstacles:

@@ -5,8 +5,6 @@ A `Value` is a number, or a function from reference positions (n, dim) [length] 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
@@ -17,7 +15,7 @@ from fastcontact.errors import ModelError
 from fastcontact.heat.conduction import Conduction, undetermined_bodies
 from fastcontact.heat.loads import Film, FixedTemperature, HeatFlux, Heating, HeatSource, NodalHeat
 from fastcontact.mesh.topology import bodies
-from fastcontact.model.parts.base import ModelBase, group_names
+from fastcontact.model.parts.base import Groups, ModelBase, group_names
 from fastcontact.model.periodicity import representatives
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.rigid_motions import body_name
@@ -75,7 +73,7 @@ class ModelHeat(ModelBase):
         """
         self._add_heat(HeatFlux(group, value, table_of(ramp, f"the ramp of the heat flux on '{group}'")))
 
-    def add_heat_source(self, value: Value, groups: Sequence[str] | str | None = None, *, ramp: History = None) -> None:
+    def add_heat_source(self, value: Value, groups: Groups = None, *, ramp: History = None) -> None:
         """Apply a volumetric heat source to groups of solid cells.
 
         Parameters

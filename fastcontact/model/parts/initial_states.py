@@ -21,9 +21,9 @@ from fastcontact.elasticity.materials import Constant
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
 from fastcontact.elasticity.temperature import Temperature, temperature_history
 from fastcontact.errors import ModelError
-from fastcontact.model.parts.base import group_names
+from fastcontact.model.parts.base import Groups, group_names
 from fastcontact.model.parts.loads import ModelLoads
-from fastcontact.model.ramp import History, Table, table_of
+from fastcontact.model.ramp import History, Table, sums_by_ramp, table_of
 
 
 @typed(ModelError)
@@ -33,7 +33,7 @@ class ModelInitialStates(ModelLoads):
     def add_temperature(
         self,
         value: Value | Array,
-        groups: Sequence[str] | str | None = None,
+        groups: Groups = None,
         *,
         reference: float | None = None,
         times: Sequence[float] | None = None,
@@ -92,7 +92,7 @@ class ModelInitialStates(ModelLoads):
         self,
         file: PathLike | Sequence[PathLike],
         field: str,
-        groups: Sequence[str] | str | None = None,
+        groups: Groups = None,
         *,
         reference: float | None = None,
         instant: float | None = None,
@@ -154,7 +154,7 @@ class ModelInitialStates(ModelLoads):
 
     def add_initial_stress(
         self,
-        groups: Sequence[str] | str | None = None,
+        groups: Groups = None,
         *,
         axes: Axes = None,
         ramp: History = None,
@@ -193,7 +193,7 @@ class ModelInitialStates(ModelLoads):
 
     def add_initial_strain(
         self,
-        groups: Sequence[str] | str | None = None,
+        groups: Groups = None,
         *,
         axes: Axes = None,
         ramp: History = None,
@@ -228,9 +228,7 @@ class ModelInitialStates(ModelLoads):
         """
         self._add_initial("strain", groups, tensor_components, axes, ramp)
 
-    def _add_initial(
-        self, kind: str, groups: Sequence[str] | str | None, components: Mapping[str, Any], axes: Axes, ramp: History
-    ) -> None:
+    def _add_initial(self, kind: str, groups: Groups, components: Mapping[str, Any], axes: Axes, ramp: History) -> None:
         """Add an initial stress or strain, as `kind` states."""
         names = self._solid_groups(groups, f": it has no initial {kind}")
         table = table_of(ramp, f"the ramp of the initial {kind}")
@@ -280,10 +278,9 @@ class ModelInitialStates(ModelLoads):
 
         Raises ModelError if a cell with a temperature rise has a material without a coefficient of thermal expansion.
         """
-        by_ramp: dict[Table | None, Array] = {}
         if not self.temperatures:
-            return by_ramp
-        field = self.material_field()
+            return {}
+        field, forces = self.material_field(), []
         for temperature in self.temperatures:
             rise = temperature.rise(self.mesh)
             missing = field.n_cells_without_expansion(self.mesh, rise)
@@ -292,9 +289,8 @@ class ModelInitialStates(ModelLoads):
                     f"{temperature.name} acts on {missing} solid cells whose material has no coefficient of thermal "
                     "expansion: give it expansion=..., 0.0 if it does not expand"
                 )
-            forces = self._forces_of(field, field.offset(rise))
-            by_ramp[temperature.ramp] = by_ramp.get(temperature.ramp, 0.0) + forces
-        return by_ramp
+            forces.append((temperature.ramp, self.expansion_forces(field, rise)))
+        return sums_by_ramp(forces)
 
     def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] of the thermal strains of a temperature rise.
@@ -305,14 +301,11 @@ class ModelInitialStates(ModelLoads):
 
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return the nodal forces (n_points, dim) [force] due to initial stresses and strains at multiplier 1, by ramp."""
-        by_ramp: dict[Table | None, Array] = {}
         if not self.initial_states:
-            return by_ramp
-        field = self.material_field()
-        for state in self.initial_states:
-            forces = self._forces_of(field, field.offset(None, [(1.0, state)], self.mesh.n_points))
-            by_ramp[state.ramp] = by_ramp.get(state.ramp, 0.0) + forces
-        return by_ramp
+            return {}
+        field, n = self.material_field(), self.mesh.n_points
+        offsets = ((state.ramp, field.offset(None, [(1.0, state)], n)) for state in self.initial_states)
+        return sums_by_ramp((ramp, self._forces_of(field, offset)) for ramp, offset in offsets)
 
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
         """Return the nodal forces (n_points, dim) [force] equivalent to a stress offset: minus the internal forces of it."""

@@ -16,7 +16,7 @@ from fastcontact.elasticity.loads import Load, Pressure, Value, axis_values, che
 from fastcontact.errors import ModelError
 from fastcontact.model.checks import check_forces
 from fastcontact.model.couplings import Moment, Spread, SpreadForce
-from fastcontact.model.parts.base import group_names
+from fastcontact.model.parts.base import Groups, group_names
 from fastcontact.model.parts.heat import ModelHeat
 from fastcontact.model.ramp import History, Table, table_of
 
@@ -68,9 +68,7 @@ class ModelLoads(ModelHeat):
         axes = axis_values(f"the traction on '{group}'", components, self.mesh.dim)
         self._add(loads.Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
-    def add_body_force(
-        self, groups: Sequence[str] | str | None = None, *, ramp: History = None, **components: Value | None
-    ) -> None:
+    def add_body_force(self, groups: Groups = None, *, ramp: History = None, **components: Value | None) -> None:
         """Apply a body force to groups of solid cells.
 
         Parameters
@@ -94,9 +92,7 @@ class ModelLoads(ModelHeat):
         axes = axis_values("the body force", components, self.mesh.dim)
         self._add(loads.BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
 
-    def add_gravity(
-        self, groups: Sequence[str] | str | None = None, *, ramp: History = None, **components: float | None
-    ) -> None:
+    def add_gravity(self, groups: Groups = None, *, ramp: History = None, **components: float | None) -> None:
         """Apply the weight of groups of solid cells, computed from the densities of their materials.
 
         Parameters
@@ -125,7 +121,7 @@ class ModelLoads(ModelHeat):
     def add_centrifugal(
         self,
         speed: float,
-        groups: Sequence[str] | str | None = None,
+        groups: Groups = None,
         *,
         origin: Sequence[float] = (0.0, 0.0, 0.0),
         direction: Sequence[float] | None = None,

@@ -164,14 +164,10 @@ class ModelSupports(ModelContact):
         value, table = _checked_value(name, value, table_of(ramp, f"the ramp of {name}"))
         rows, positions = rows_along(nodes, directions, self.n_dofs), self.mesh.points[nodes]
         if isinstance(value, tuple):  # the displacement of each node has a separate history
-            histories = zip(
-                *(evaluated(displacement, positions, name).tolist() for _, displacement in value), strict=True
-            )
+            histories = zip(*(evaluated(u, positions, name).tolist() for _, u in value), strict=True)
             begin, instants = [(0.0, 0.0)] if value[0][0] else [], [instant for instant, _ in value]
-            relations = [
-                MultiPointConstraint(name, rows[[row]], 1.0, (*begin, *zip(instants, history, strict=True)))
-                for row, history in enumerate(histories)
-            ]
+            tables = [(*begin, *zip(instants, history, strict=True)) for history in histories]
+            relations = [MultiPointConstraint(name, rows[[row]], 1.0, table) for row, table in enumerate(tables)]
         else:
             relations = [MultiPointConstraint(name, rows, evaluated(value, positions, name), table)]
         self.relations += relations
