@@ -362,8 +362,10 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
         )
         return
     friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
-    # Rotations of preloaded bodies matter however small they are.
-    if angle > 0.5 * OUT_OF_BALANCE * friction or (_ratio(*_work_on_strains(problem, last, True)) > NEGLECTED).any():
+    # Rotations of preloaded bodies matter however small they are. In bodies without other stresses than those due to the
+    # neglected strains, the works are about equal.
+    at_centres = _ratio(*_work_on_strains(problem, last, at_centres=True))
+    if angle > 0.5 * OUT_OF_BALANCE * friction or ((at_centres > NEGLECTED) & (at_centres < 0.5)).any():
         yield from _neglected_rotation(problem, last, angle)
 
 

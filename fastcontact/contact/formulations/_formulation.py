@@ -645,7 +645,8 @@ class Formulation(ABC):
             return side
         across = np.zeros((len(side.points), *2 * (self.points.shape[1],)))  # projectors onto the normals of the planes
         for axis, nodes in symmetry_planes(self.held_motions, side, self.points, self.points[opposite.points]):
-            across[nodes] += np.outer(axis, axis)
+            held = self.held_motions.projectors_at(side.points[nodes]) @ axis
+            across[nodes] += held[:, :, None] * held[:, None]
         across = _without_complete_facets(across, side)
         nodes = np.flatnonzero(across.any(axis=(1, 2)))
         if not len(nodes):
