@@ -16,7 +16,7 @@ from scipy.sparse import csr_array, diags_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.sparse_rows import scaled
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +85,18 @@ class Delassus:
         if self.U is None:
             return Delassus(self.d[n], self.S[np.ix_(n, n)])
         return Delassus(self.d[n], self.S, self.U[n])
+
+    def accurate(self) -> Delassus:
+        """Return F, with U only if the solutions of Newton steps are then accurate up to ROUND_OFF.
+
+        Their relative error is about that of double precision times the square of the ratio of F to d on the diagonal.
+        """
+        if self.U is None:
+            return self
+        ratio = float((self.diagonal() / self.d).max(initial=0.0))
+        if ratio**2 * np.finfo(float).eps <= ROUND_OFF:
+            return self
+        return Delassus(self.d, np.asarray(self.U @ (self.U @ self.S).T))
 
     @property
     def dependent(self) -> bool:

@@ -286,19 +286,21 @@ def _with_compliance(F: Delassus, constraints: Constraints, rows: Indices, compo
         normal = normals(list(along))
         normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
         frame = np.concatenate([normal[None], along]).reshape(-1, dim)[components]
-        if F.U is None:
+    if F.U is not None:
+        assert constraints.compliance is not None
+        d, P, inverse_mass = constraints.compliance.split(rows)
+        added = np.where(d > 0.0, 0.0, F.diagonal()[: len(rows)])  # and subtracted in the next term
+        (rigid,) = np.nonzero(added[at])
+        columns = [scaled(P[at], along_axis) for along_axis in frame.T]
+        columns += [csr_array((np.ones(len(rigid)), (rigid, np.arange(len(rigid)))), (len(F), len(rigid)))]
+        S = block_diag(F.S, *dim * [-inverse_mass], -np.diag(added[at[rigid]]), np.eye(Z.shape[1]))
+        U = csc_array(hstack([F.U, *columns, csr_array(Z)], format="csc"))
+        used = np.flatnonzero(np.diff(U.indptr))
+        F = Delassus(F.d + (d + added)[at], S[np.ix_(used, used)], csr_array(U[:, used])).accurate()
+        check_rows(len(F) if F.U is None else len(used), MAX_ROWS_WITH_FRICTION)
+    else:
+        if constraints.compliance is not None:
             F.S[:] += constraints.compliance.block(rows)[np.ix_(at, at)] * (frame @ frame.T)
-        else:
-            d, P, inverse_mass = constraints.compliance.split(rows)
-            added = np.where(d > 0.0, 0.0, F.diagonal()[: len(rows)])  # and subtracted in the next term
-            (rigid,) = np.nonzero(added[at])
-            columns = [scaled(P[at], along_axis) for along_axis in frame.T]
-            columns += [csr_array((np.ones(len(rigid)), (rigid, np.arange(len(rigid)))), (len(F), len(rigid)))]
-            S = block_diag(F.S, *dim * [-inverse_mass], -np.diag(added[at[rigid]]), np.eye(Z.shape[1]))
-            U = csc_array(hstack([F.U, *columns, csr_array(Z)], format="csc"))
-            used = np.flatnonzero(np.diff(U.indptr))
-            check_rows(len(used), MAX_ROWS_WITH_FRICTION)
-            F = Delassus(F.d + (d + added)[at], S[np.ix_(used, used)], csr_array(U[:, used]))
-    if F.U is None and Z.size:
-        F.S[:] += Z @ Z.T
+        if Z.size:
+            F.S[:] += Z @ Z.T
     return F.softened(spread(constraints.softness[rows], np.arange(len(rows)), (len(F),)))
