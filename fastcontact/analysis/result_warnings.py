@@ -362,11 +362,18 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
         )
         return
     friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
-    # Rotations of preloaded bodies matter however small they are. In bodies without other stresses than those due to the
-    # neglected strains, the works are about equal.
-    at_centres = _ratio(*_work_on_strains(problem, last, at_centres=True))
-    if angle > 0.5 * OUT_OF_BALANCE * friction or ((at_centres > NEGLECTED) & (at_centres < 0.5)).any():
+    if angle > 0.5 * OUT_OF_BALANCE * friction or _is_preloaded(problem, last):
         yield from _neglected_rotation(problem, last, angle)
+
+
+def _is_preloaded(problem: Problem, last: StepResult) -> bool:
+    """Return whether the stresses of a body are so large that even small rotations matter, estimated at centres of cells.
+
+    In bodies without other stresses than those due to neglected strains, the works on strains and on neglected strains are
+    about equal. Such bodies are not included.
+    """
+    ratio = _ratio(*_work_on_strains(problem, last, at_centres=True))
+    return bool(((ratio > NEGLECTED) & (ratio < 0.5)).any())
 
 
 def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:

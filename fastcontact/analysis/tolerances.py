@@ -44,7 +44,7 @@ class Tolerances:
     ----------
     solver : LinearSolver
     criteria : Criteria
-    first : float
+    first_residual : float
         Largest relative residual of the first solution, unless the tolerance of the solver is larger [-].
     round_off : float
         Bound of the round-off of gaps [length].
@@ -52,9 +52,11 @@ class Tolerances:
         Scale of the displacements in the first step, if only forces act [length].
     """
 
-    def __init__(self, solver: LinearSolver, criteria: Criteria, first: float, round_off: float, scale: float) -> None:
+    def __init__(
+        self, solver: LinearSolver, criteria: Criteria, first_residual: float, round_off: float, scale: float
+    ) -> None:
         self._solver, self._criteria, self._round_off, self._first_scale = solver, criteria, round_off, scale
-        self._residual = max(solver.tolerance, first)
+        self._residual = max(solver.tolerance, first_residual)
 
     @property
     def inexact(self) -> bool:

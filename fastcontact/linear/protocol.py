@@ -38,6 +38,7 @@ class Product(Protocol):
         """Return ``abs(K) @ abs(u)`` (n,) [force]."""
 
 
+# A matrix that is stored in blocks, or the object that replaces it in products, see `LinearSolver.prepare`.
 Matrix: TypeAlias = bsr_array | Product
 
 

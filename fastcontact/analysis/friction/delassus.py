@@ -49,7 +49,7 @@ class Delassus:
         S = self.S.diagonal() if self.U is None else self.U.multiply(self.U @ self.S).sum(axis=1)
         return np.asarray(self.d + S)
 
-    def of_each(self, number: Indices) -> Array:
+    def diagonal_blocks(self, number: Indices) -> Array:
         """Return the compliance (1 + k, 1 + k, m) of each constraint.
 
         `number` (1 + k, m) are the numbers in F of the normal components, then of the components along each tangent.
@@ -65,7 +65,7 @@ class Delassus:
         return np.where(given[:, None] & given, values, 0.0)
 
     def softened(self, softness: Array | float) -> Delassus:
-        """Return the sum of F and a diagonal matrix."""
+        """Return the sum of F and the diagonal matrix of `softness` (n,) [length / force]."""
         return replace(self, d=self.d + softness)
 
     def scaled(self, units: Array) -> Delassus:
@@ -80,13 +80,13 @@ class Delassus:
             return Delassus(self.d, np.asarray(Q @ (Q @ self.S).T))
         return replace(self, U=csr_array(Q @ self.U))
 
-    def among(self, n: Indices) -> Delassus:
+    def submatrix(self, n: Indices) -> Delassus:
         """Return the submatrix of the rows and columns `n`."""
         if self.U is None:
             return Delassus(self.d[n], self.S[np.ix_(n, n)])
         return Delassus(self.d[n], self.S, self.U[n])
 
-    def accurate(self) -> Delassus:
+    def in_accurate_form(self) -> Delassus:
         """Return F, with U only if the solutions of Newton steps are then accurate up to ROUND_OFF.
 
         Their relative error is about that of double precision times the square of the ratio of F to d on the diagonal.
@@ -99,8 +99,8 @@ class Delassus:
         return Delassus(self.d, np.asarray(self.U @ (self.U @ self.S).T))
 
     @property
-    def dependent(self) -> bool:
-        """Whether rows are linearly dependent up to round-off, if F is scaled to a diagonal of ones for the gaps.
+    def is_singular(self) -> bool:
+        """Whether F is singular up to round-off, given that it is scaled to a diagonal of ones for the gaps.
 
         With U, F can be singular only for forces in the range of the columns of ``diag(d)^-1 U`` with negative values in S.
         """

@@ -85,9 +85,9 @@ def solve(
     F, best, iterations, elastic_slip = F.scaled(units), None, 0, 0.0
     if guess is not None:
         guess = guess / (length * unit)
-    for compliance in REGULARISATION if F.dependent else (0.0,):
+    for compliance in REGULARISATION if F.is_singular else (0.0,):
         regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
-        F = F.softened(spread(np.full(len(regularised), compliance), regularised, (len(F),)))
+        F = F.softened(scattered(np.full(len(regularised), compliance), regularised, (len(F),)))
         problem = _Problem(F, free * unit / length, law, components)
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
@@ -121,7 +121,7 @@ class _Problem:
 
     def gaps(self, y: Array) -> Array:
         """Return gaps and slips (1 + k, m) for forces y (1 + k, m)."""
-        return self.free + spread(self.F @ y.ravel()[self.components], self.components, self.free.shape)
+        return self.free + scattered(self.F @ y.ravel()[self.components], self.components, self.free.shape)
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised`."""
@@ -171,14 +171,14 @@ class _Problem:
         return y
 
 
-def spread(values: Array, at: Indices, shape: tuple[int, ...]) -> Array:
+def scattered(values: Array, at: Indices, shape: tuple[int, ...]) -> Array:
     """Return an array of a `shape` with the `values` (n,) at the positions `at` (n,), and zeros elsewhere."""
     result = np.zeros(shape)
     result.ravel()[at] = values
     return result
 
 
-def numbered(at: Indices, shape: tuple[int, ...]) -> Indices:
+def numbers_at(at: Indices, shape: tuple[int, ...]) -> Indices:
     """Return an array of a `shape` with the numbers 0 to n - 1 at the positions `at` (n,), and -1 elsewhere."""
     result = np.full(shape, -1, np.intp)
     result.ravel()[at] = np.arange(len(at))
@@ -202,7 +202,7 @@ class _Equations:
     def forces(self, free: Array, solve: Callable[[Array], Array]) -> Array:
         """Return the forces (1 + k, m), where `solve` solves systems with A. `free` (1 + k, m) are gaps without forces."""
         values = free.ravel()[self.at]
-        return spread(self.back @ solve(-self.right(values)) - self.H @ values, self.at, free.shape)
+        return scattered(self.back @ solve(-self.right(values)) - self.H @ values, self.at, free.shape)
 
 
 def _equations(
@@ -210,7 +210,7 @@ def _equations(
 ) -> _Equations:
     """Return the equations of the `closed` constraints; F belongs to the `components`, see `solve`."""
     rows, selected = np.flatnonzero(closed), np.flatnonzero(closed[components % len(closed)])
-    number, n = numbered(components[selected], y.shape)[:, rows], len(selected)
+    number, n = numbers_at(components[selected], y.shape)[:, rows], len(selected)
     shape = len(number), *number.shape
     row, column = np.broadcast_to(number[:, None], shape), np.broadcast_to(number, shape)
 
@@ -219,7 +219,7 @@ def _equations(
         return csr_array((blocks[nonzero], (row[nonzero], column[nonzero])), shape=(n, n))
 
     E, D = law.linearised(y, gaps, rows, sticking)
-    F, at = F.among(selected), components[selected]
+    F, at = F.submatrix(selected), components[selected]
     if F.U is None:
         F_matrix, D_matrix = F.S, matrix(D)
         F_matrix[np.arange(n), np.arange(n)] += F.d
@@ -254,7 +254,7 @@ def response(
     solve_dense = lu_solver(equations.A)
 
     def force_change(gaps: Array) -> Array:
-        values = spread(gaps if Q is None else Q @ gaps, components, forces.y.shape) * unit
+        values = scattered(gaps if Q is None else Q @ gaps, components, forces.y.shape) * unit
         values[1:][held_slips] = 0.0
         change = (equations.forces(values, solve_dense) * unit).ravel()[components]
         return change if Q is None else np.asarray(Q.T @ change)

@@ -27,7 +27,7 @@ from fastcontact.analysis.friction.cone_newton import (
     rotated,
 )
 from fastcontact.analysis.friction.delassus import Delassus
-from fastcontact.analysis.friction.dense import numbered, spread
+from fastcontact.analysis.friction.dense import numbers_at, scattered
 from fastcontact.analysis.solution import Accuracy, Forces, Path, SlipSoFar, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
@@ -148,27 +148,27 @@ def _with_included(
     frictional = np.stack(constraints.directions)[:, rows].any(axis=(0, 2))
     components = np.flatnonzero(np.vstack([np.ones_like(frictional), *k * [frictional]]))
     all_rows = csr_array(vstack([constraints.B, *constraints.tangents], format="csr"))
-    place = (np.arange(1 + k)[:, None] * m + rows).ravel()[components]
-    R = all_rows[place]
+    row_numbers = (np.arange(1 + k)[:, None] * m + rows).ravel()[components]
+    R = all_rows[row_numbers]
     gaps_at_rest = constraints.gaps_at_rest()
     rigid_compliance = loaded.rigid_compliance(R)
     # The compliance of soft springs is so large that the factored form would not be accurate.
     factored = k == 2 and constraints.compliance is not None and not np.any(rigid_compliance)
     free, F = _delassus(loaded, R, factored)
-    number = numbered(components, (1 + k, len(rows)))
+    number = numbers_at(components, (1 + k, len(rows)))
     slips = np.arange(len(rows), len(F))
     # This compliance is added before held tangents are detected, since compliant tangents are not held.
-    F = F.softened(spread(np.tile(constraints.tangential_softness[rows[frictional]], k), slips, (len(F),)))
-    Q = aligning_rotation(F.of_each(number)) if k == 2 else None
+    F = F.softened(scattered(np.tile(constraints.tangential_softness[rows[frictional]], k), slips, (len(F),)))
+    Q = aligning_rotation(F.diagonal_blocks(number)) if k == 2 else None
     Q_F = None if Q is None else csr_array(Q[components][:, components])
-    C = (F if Q_F is None else F.rotated(Q_F)).of_each(number)
+    C = (F if Q_F is None else F.rotated(Q_F)).diagonal_blocks(number)
     C[0, 0] += np.where(constraints.prescribed, constraints.softness, 0.0)[rows]
     held_slips = held_tangents(C) & frictional
     held_rows = number[1:][held_slips]
     F = _with_compliance(F, constraints, rows, components)
     if not factored:
         F = replace(F, S=F.S + rigid_compliance)
-    free = spread(free, components, number.shape) + gaps_at_rest[:, rows]
+    free = scattered(free, components, number.shape) + gaps_at_rest[:, rows]
     guess = None if forces is None else forces[:, rows]
     y0, closing = np.zeros_like(free), np.zeros_like(free)
     if path is not None:
@@ -180,8 +180,8 @@ def _with_included(
     if len(held_rows):
         prescribed = held_slips & constraints.imposes_slip(rows, Q)
         values = np.where(prescribed, SLIP_COMPLIANCE * C[0, 0], F.diagonal().max())[held_slips]
-        F = F.scaled(1.0 - spread(np.ones(len(values)), held_rows, (len(F),)))
-        F = F.softened(spread(values, held_rows, (len(F),)))
+        F = F.scaled(1.0 - scattered(np.ones(len(values)), held_rows, (len(F),)))
+        F = F.softened(scattered(values, held_rows, (len(F),)))
         free[1:][held_slips & ~prescribed] = 0.0
         y0[1:][held_slips], closing[1:][held_slips] = 0.0, 0.0
     mu, equations = constraints.friction[rows], constraints.equality[rows]
@@ -189,7 +189,7 @@ def _with_included(
         result, before = dense.solve(F, free, mu, closed[rows], guess, equations, components), None
         gaps_of_included = result.gaps
     else:
-        lag = -free - spread(F @ y0.ravel()[components], components, free.shape)
+        lag = -free - scattered(F @ y0.ravel()[components], components, free.shape)
         lag[0] += closing[0]
 
         def increment(offset: Array, carrying: Mask, closed: Mask, start: Array | None) -> Forces:
@@ -197,10 +197,10 @@ def _with_included(
             given = np.flatnonzero(number[:, at] >= 0)
             n = number[:, at].ravel()[given]
             start = None if start is None else start[:, at]
-            result = dense.solve(F.among(n), gaps[:, at], mu[at], closed[at], start, equations[at], given)
+            result = dense.solve(F.submatrix(n), gaps[:, at], mu[at], closed[at], start, equations[at], given)
             y, (closed, sticking) = np.zeros_like(gaps), np.zeros((2, len(rows)), bool)
             y[:, at], closed[at], sticking[at] = result.y, result.closed, result.sticking
-            gaps += spread(F @ y.ravel()[components], components, gaps.shape)
+            gaps += scattered(F @ y.ravel()[components], components, gaps.shape)
             return replace(result, y=y, gaps=gaps, closed=closed, sticking=sticking)
 
         result, gaps_of_included, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
@@ -222,18 +222,19 @@ def _with_included(
         sticking, result.residual, constraints.directions,
         slip_so_far=None if before is None else _slip_so_far(before, Q, rows, constraints),
         response=lambda: response(
-            loaded, R, place, dense.response(F, Law(mu, equations), at_end, held_slips, Q_F, components)
+            loaded, R, row_numbers, dense.response(F, Law(mu, equations), at_end, held_slips, Q_F, components)
         ),
     )  # fmt: skip
 
 
 def _delassus(loaded: Loaded, R: csr_array, factored: bool) -> tuple[Array, Delassus]:
     """Return the gaps and slips (n,) without contact forces, and their Delassus operator, `factored` with U = R or not."""
-    involved = np.unique(R.indices)
-    check_rows(len(involved) if factored else R.shape[0], MAX_ROWS_WITH_FRICTION)
     if not factored:
+        check_rows(R.shape[0], MAX_ROWS_WITH_FRICTION)
         free, F = loaded.delassus(R)
         return free, Delassus(np.zeros(len(F)), F)
+    involved = np.unique(R.indices)
+    check_rows(len(involved), MAX_ROWS_WITH_FRICTION)
     identity = np.ones(len(involved)), (np.arange(len(involved)), involved)
     u, inverse = loaded.delassus(csr_array(identity, (len(involved), R.shape[1])))
     U = csr_array(R[:, involved])
@@ -296,11 +297,11 @@ def _with_compliance(F: Delassus, constraints: Constraints, rows: Indices, compo
         S = block_diag(F.S, *dim * [-inverse_mass], -np.diag(added[at[rigid]]), np.eye(Z.shape[1]))
         U = csc_array(hstack([F.U, *columns, csr_array(Z)], format="csc"))
         used = np.flatnonzero(np.diff(U.indptr))
-        F = Delassus(F.d + (d + added)[at], S[np.ix_(used, used)], csr_array(U[:, used])).accurate()
+        F = Delassus(F.d + (d + added)[at], S[np.ix_(used, used)], csr_array(U[:, used])).in_accurate_form()
         check_rows(len(F) if F.U is None else len(used), MAX_ROWS_WITH_FRICTION)
     else:
         if constraints.compliance is not None:
             F.S[:] += constraints.compliance.block(rows)[np.ix_(at, at)] * (frame @ frame.T)
         if Z.size:
             F.S[:] += Z @ Z.T
-    return F.softened(spread(constraints.softness[rows], np.arange(len(rows)), (len(F),)))
+    return F.softened(scattered(constraints.softness[rows], np.arange(len(rows)), (len(F),)))

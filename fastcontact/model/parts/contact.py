@@ -191,9 +191,9 @@ class ModelContact(ModelConnections):
         >>> len(model.add_contacts(friction=0.2))
         1
         """
-        moduli = self.contact_moduli() if self.materials else None
         from fastcontact.contact.found_contacts import FoundContacts, find_contacts, no_contacts_message
 
+        moduli = self.contact_moduli() if self.materials else None
         contacts = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
         if not contacts.pairs:
             raise ContactError(no_contacts_message(self.mesh, distance, angle, groups))
