@@ -46,6 +46,8 @@ class ActiveDofs:
         Positions, among the active components, of those on which contact depends.
     determined : ndarray of int
         Positions, among the active components, of those at which direct solvers compute the solutions of the contact problem.
+    springs : ndarray of int
+        Positions of the components with springs, which are unknowns, among the active unknowns.
     T, transpose : csr_array (k, l), csr_array (l, k)
         Derivatives of the active components with respect to the active unknowns [-], and their transpose, which maps forces
         on the active components to generalised forces.
@@ -55,6 +57,7 @@ class ActiveDofs:
         involved, all_dofs = np.union1d(contact, springs), np.arange(len(system.free))
         self.active, self._unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
         self.compared, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact, involved))
+        self.springs = np.searchsorted(self._unknowns, springs)
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free
         self._system, self.T = system, csr_array(csr_array(T)[self.active][:, self._unknowns])
@@ -88,14 +91,13 @@ class ActiveDofs:
         tangents, slip0 = tuple(rows[1:]), offsets[1:]
         return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tangents, slip0=slip0, prescribed=prescribed)
 
-    def unknowns(self, u: Array, lift: Array) -> Array:
-        """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints."""
+    def unknowns(self, u: Array, lift: Array | float = 0.0) -> Array:
+        """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints.
+
+        Several motions (n, k) without prescribed displacements may be given; their unknowns (l, k) are returned.
+        """
         return self._system.unknowns(u, lift)[self._unknowns]
 
     def displacement(self, v: Array, lift: Array) -> Array:
         """Return the active components (k,) for active unknowns `v`."""
         return np.asarray(lift[self.active] + self.T @ v)
-
-    def numbers(self, unknowns: Indices) -> Indices:
-        """Return the positions (k,) of `unknowns` (k,), numbers of unknowns of the system, among the active unknowns."""
-        return np.searchsorted(self._unknowns, unknowns)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
@@ -11,6 +13,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 DEPTH = 5
 
 
+@dataclass(eq=False)
 class Anderson:
     """Anderson acceleration of the fixed-point iteration ``x = G(x)``.
 
@@ -28,28 +31,27 @@ class Anderson:
         Whether the other components are combined as well. This is required if G uses them as an initial guess.
     """
 
-    def __init__(self, depth: int, where: Indices, all_mixed: bool = True) -> None:
-        self.depth, self.where = depth, where
-        self.mixes: slice | Indices = slice(None) if all_mixed else where
-        self._residuals: list[Array] = []
-        self._images: list[Array] = []
+    depth: int
+    where: Indices
+    all_mixed: bool = True
+    # Residuals and images of the last iterates.
+    _iterates: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
 
     def restart(self) -> None:
         """Discard the earlier iterates, because G has changed."""
-        self._residuals.clear()
-        self._images.clear()
+        self._iterates.clear()
 
     def mixed(self, x: Array, image: Array) -> Array:
         """Return the next iterate (n,), given the last iterate `x` (n,) and its `image` G(x) (n,)."""
-        self._residuals.append((image - x)[self.where])
-        self._images.append(image[self.mixes])
-        del self._residuals[: -self.depth - 1], self._images[: -self.depth - 1]
-        if len(self._residuals) < 2:
+        mixed_components = slice(None) if self.all_mixed else self.where
+        self._iterates.append(((image - x)[self.where], image[mixed_components]))
+        del self._iterates[: -self.depth - 1]
+        *earlier, (residual, last_image) = self._iterates
+        if not earlier:
             return image
-        last = self._residuals[-1]
-        differences = np.column_stack([last - earlier for earlier in self._residuals[:-1]])
-        weights = np.linalg.lstsq(differences, last, rcond=LENGTH_ROUND_OFF)[0]
-        mixture, newest = image.copy(), self._images[-1]
-        for weight, earlier in zip(weights, self._images[:-1], strict=True):
-            mixture[self.mixes] -= weight * (newest - earlier)
+        differences = np.column_stack([residual - earlier_residual for earlier_residual, _ in earlier])
+        weights = np.linalg.lstsq(differences, residual, rcond=LENGTH_ROUND_OFF)[0]
+        mixture = image.copy()
+        for weight, (_, earlier_image) in zip(weights, earlier, strict=True):
+            mixture[mixed_components] -= weight * (last_image - earlier_image)
         return mixture

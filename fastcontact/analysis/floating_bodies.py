@@ -257,12 +257,12 @@ class FloatingBodies:
 
     def position_response(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> PositionResponse:
         """Return the linear response to positions of the springs, given `respond` for springs at a fixed position."""
-        modes, springs = self.motions.displacement, dofs.numbers(self.dofs)
+        modes = self.motions.displacement
         changes = np.stack([rows @ modes for rows in (constraints.B, *constraints.tangents)])
-        rigid = self._unknowns(dofs)
+        rigid = dofs.unknowns(modes)
         unloaded = np.zeros(len(rigid))
         strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(changes, -1, 0)], axis=1)
-        return PositionResponse(respond, rigid + strained, strained[springs], springs, changes[0])
+        return PositionResponse(respond, rigid + strained, strained[dofs.springs], dofs.springs, changes[0])
 
     def with_soft_springs(self, loaded: Loaded, dofs: ActiveDofs, load: Array, slides: bool) -> SoftSprings:
         """Return the prepared matrix `loaded` with soft springs, given the generalised forces `load` (k,) [force].
@@ -271,12 +271,7 @@ class FloatingBodies:
         """
         stiffness = (SINGLE_PRECISION if slides else SOFT) * self.stiffness
         modes = self._values_at_springs  # in terms of those with springs, which depend on the choice of nodes
-        return SoftSprings(loaded, self._unknowns(dofs) @ modes, modes.T @ load, stiffness)
-
-    def _unknowns(self, dofs: ActiveDofs) -> Array:
-        """Return the active unknowns (n, k) in the free rigid-body modes."""
-        zero_lift = np.zeros(len(self.motions.displacement))
-        return np.stack([dofs.unknowns(mode, zero_lift) for mode in self.motions.displacement.T], axis=1)
+        return SoftSprings(loaded, dofs.unknowns(self.motions.displacement) @ modes, modes.T @ load, stiffness)
 
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as a dict of numbers and strings.

@@ -120,13 +120,12 @@ def _settle(
     limit = criteria.max_geometry_updates if limit is None else limit
     # From a converged iterate, the loop continues without extrapolation and with accurate solutions.
     extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
-    first_residual = 0.0
+    residual = problem.solver.tolerance
     if extrapolates:
-        first_residual = RESIDUAL * NOTABLE if step.state.extrapolation.ratio else NOTABLE
-    tolerances = Tolerances(problem.solver, criteria, first_residual, step.state.gap_round_off, step.expected)
-    mixing, window = _Mixing(step), ScatterWindow()
-    if extrapolates:
+        residual = max(residual, RESIDUAL * NOTABLE if step.state.extrapolation.ratio else NOTABLE)
         iterate.u = step.state.extrapolation.predicted(iterate.u, degree=1)
+    tolerances = Tolerances(problem.solver, criteria, residual, step.state.gap_round_off, step.expected)
+    mixing, window = _Mixing(step), ScatterWindow()
     for update in range(limit + 1):
         if update == 0 and paired is not None and paired.paired_at is not None:
             iterate.u[problem.contact_dofs], constraints = paired.paired_at, paired.constraints
@@ -149,7 +148,13 @@ def _settle(
                 raise ConvergenceError("an increment does not converge", iterate.history)
             step = replace(step, path=solution.slip_so_far)
             mixing, window = _Mixing(step), ScatterWindow()
-        last_update = _store_solution(step, iterate, constraints, solution, displacement)
+        before = iterate.u[problem.dofs.active]
+        change = largest(displacement - before)
+        # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
+        size = max(step.condensed_size, largest(solution.u), largest(step.load.lift))
+        relative_change = change / size if size and change > step.state.gap_round_off else 0.0
+        iterate.u[problem.dofs.active] = displacement
+        _store_solution(iterate, constraints, solution, relative_change)
         if not (solution.settled or accuracy.inexact):
             nodes_that_change = nearest_nodes(problem, constraints, np.flatnonzero(solution.active != solution.wanted))
             iterate.history[-1]["nodes"] = nodes_that_change
@@ -157,12 +162,10 @@ def _settle(
             raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue
-        change, size = last_update.change, last_update.largest_displacement
         tolerance = tolerances.geometry_tolerance(size)
         if not tolerances.inexact:
             increments.check(constraints, solution, change - tolerance, size, iterate.u)
-        paired_at = last_update.before[problem.dofs.compared]
-        settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=paired_at)
+        settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=before[problem.dofs.compared])
         if not solution.settled or tolerances.inexact:
             window = ScatterWindow()
         elif change <= tolerance and not (increments.due or increments.unfinished):
@@ -173,8 +176,8 @@ def _settle(
                 "contact forces by %.1e (Criteria.geometry = %g)", *scatter.values(), problem.criteria.geometry,
             )  # fmt: skip
             return replace(settled, scatter=scatter)
-        iterate.u[problem.dofs.active] = mixing.next(settled, last_update, displacement, tolerance, tolerances.inexact)
-        tolerances.tighten(last_update.relative_change, solution.residual)
+        iterate.u[problem.dofs.active] = mixing.next(settled, before, displacement, tolerance, tolerances.inexact)
+        tolerances.tighten(relative_change, solution.residual)
         late = update >= max(limit // 2, UPDATES_BEFORE_ROUNDING) and not iterate.rounded
         if late and any(pair.may_alternate(constraints.parts[name]) for name, pair in problem.pairs.items()):
             log.info("pairings alternate: edges of facets are now rounded, and small overlaps carry no constraint")
@@ -182,59 +185,30 @@ def _settle(
             mixing.accelerated, window = None, ScatterWindow()
     if problem.until_settled:
         changes = np.zeros_like(iterate.u)
-        changes[problem.dofs.active] = displacement - last_update.before
+        changes[problem.dofs.active] = displacement - before
         raise ConvergenceError(geometry_not_converged(problem, iterate.history, changes, limit), iterate.history)
     increments.check(constraints, solution, 0.0, 0.0, iterate.u)
     if increments.due or increments.unfinished:
         del iterate.history[-limit - 1 :]
         return _settle(step, iterate, increments)
-    last_change = (limit, last_update.relative_change) if limit and not criteria.keep_pairing else None
+    last_change = (limit, relative_change) if limit and not criteria.keep_pairing else None
     return SettledContact(constraints, solution, iterate, last_change, nodes=nodes)
 
 
-@dataclass(frozen=True, eq=False)
-class _Update:
-    """Change of the displacements in one geometry update, in the components of `Problem.dofs`.
-
-    Attributes
-    ----------
-    before : ndarray (k,)
-        Displacements before the update [length].
-    change : float
-        Largest change of a component [length].
-    largest_displacement : float
-        Scale of the displacements, to which the change is compared [length].
-    relative_change : float
-        Ratio of `change` to `largest_displacement`; zero without displacements, and for changes that are round-off of
-        gaps [-].
-    """
-
-    before: Array
-    change: float
-    largest_displacement: float
-    relative_change: float
-
-
 def _store_solution(
-    step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, displacement: Array
-) -> _Update:
-    """Store a solution and its displacements (k,) of the components of `Problem.dofs` [length]; return the update."""
-    active_dofs = step.problem.dofs.active
-    before = iterate.u[active_dofs]
-    iterate.u[active_dofs] = displacement
-    # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
-    size = max(step.condensed_size, largest(solution.u), largest(step.load.lift))
-    change = largest(displacement - before)
-    significant = size and change > step.state.gap_round_off
-    last_update = _Update(before, change, size, change / size if significant else 0.0)
+    iterate: Iterate, constraints: StackedConstraints, solution: Solution, relative_change: float
+) -> None:
+    """Store the active sets and the pressures of a solution, and append its data to the history.
+
+    `relative_change` is the change of the displacements relative to the largest one, zero if it is round-off [-].
+    """
     for name, rows in constraints.rows.items():
         iterate.active[name] = solution.wanted[rows]
         forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
         iterate.pressure[name] = constraints.parts[name].pressure(forces)  # without fluid pressure
-    entry = {"displacement_change": last_update.relative_change, "active": int(solution.active.sum())}
+    entry = {"displacement_change": relative_change, "active": int(solution.active.sum())}
     entry |= {"active_set_iterations": solution.iterations, "settled": solution.settled}
     iterate.history.append(entry | ({"rounded": True} if iterate.rounded else {}))
-    return last_update
 
 
 class _Mixing:
@@ -265,16 +239,17 @@ class _Mixing:
     accelerated: Anderson | None
 
     def next(
-        self, settled: SettledContact, last_update: _Update, displacement: Array, tolerance: float, inexact: bool
+        self, settled: SettledContact, before: Array, displacement: Array, tolerance: float, inexact: bool
     ) -> Array:
         """Return the displacements (k,) for the next pairing, of the components of `Problem.dofs` [length].
 
-        After an `inexact` solution, these are the displacements of the solution, `displacement` (k,). The geometry has
-        converged if changes are below `tolerance` [length]. Newton's method is abandoned once changes increase, because it
-        does not converge if nodes alternate between facets. With cohesive layers, its steps are shortened instead. It is also
-        omitted if the next solution alone is expected to converge, because a solution without a Newton step is cheaper.
+        The last pairing was at the displacements `before` (k,), and its solution has the displacements `displacement` (k,),
+        which are returned after an `inexact` solution. The geometry has converged if changes are below `tolerance` [length].
+        Newton's method is abandoned once changes increase, because it does not converge if nodes alternate between facets.
+        With cohesive layers, its steps are shortened instead. It is also omitted if the next solution alone is expected to
+        converge, because a solution without a Newton step is cheaper.
         """
-        solution, before, change = settled.solution, last_update.before, last_update.change
+        solution, change = settled.solution, largest(displacement - before)
         if (shortened := self._shortened_step(before, displacement)) is not None:
             return shortened
         branches = settled.constraints.branches

@@ -250,74 +250,118 @@ def _with_floating_bodies(
     Springs that are anchored at a rigid position of these bodies hold them. `FloatingBodies.settle` iterates the position
     until the springs carry no force.
     """
-    problem, state, lift, dofs = step.problem, step.state, step.load.lift, step.problem.dofs
-    last_active, guess = active, iterate.u
-
-    def solve_at(anchor: Array, loaded: Loaded = step.loaded) -> Solution:
-        nonlocal last_active, guess
-        shifted_lift = lift + bodies.rigid(anchor)
-        solution = _solve(
-            replace(step, loaded=loaded), constraints, iterate, last_active, accuracy, shifted_lift, guess
-        )
-        last_active, guess = solution.wanted, guess.copy()
-        guess[dofs.active] = dofs.displacement(solution.u, shifted_lift)
-        return solution
-
-    def failure(text: str, **options: bool) -> ConvergenceError:
-        needed = needed_friction(constraints, bodies.motions, iterate.u, *loads)
-        text = text if needed is None else friction_exceeded(*needed, constraints.friction)
-        text += loose_bolts_remark(problem.model.pretensions, modes, step.load.force.reshape(problem.shape))
-        return ConvergenceError(text, iterate.history, **options)
-
-    start, modes = iterate.u[bodies.dofs], bodies.motions.displacement
-    model_size = float(np.ptp(problem.model.mesh.points, axis=0).max())
-    force = step.load.force
-    if (u := problem.linearised_at) is not None:  # residual forces, since a loaded tangent resists rigid-body rotations
-        force = force - problem.system.K @ bodies.strained(u)
-    # Work of the loads in each free rigid-body motion, and the size of the model.
-    loads = generalised_forces(bodies.motions, force, state.largest_rigid_force), model_size
-    if not iterate.history:
-        rows, gap0 = cone_rows(constraints)
-        shift = stopped_at(rows @ modes, gap0 + rows @ iterate.u, *loads)
-        if shift is None:
-            names = grouped_by_body(bodies.names)
-            text = f"the loads pull bodies away, and no contact stops them ({names}): reverse the loads or add supports"
-            raise failure(text, smaller_steps_help=False)
-        if not (active & ~constraints.equality).any():
-            start, u = start + shift, iterate.u + bodies.rigid(shift)
-            # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
-            gap = constraints.gap0 + constraints.B @ u
-            last_active = active | constraints.usable & (gap <= SINGLE_PRECISION * model_size)
-    relative_accuracy = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
+    problem, state, dofs = step.problem, step.state, step.problem.dofs
+    contact = _FloatingContact(step, bodies, constraints, iterate, accuracy, active, iterate.u)
+    start = iterate.u[bodies.dofs] if iterate.history else contact.first_position()
+    relative_accuracy, round_off = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0), state.gap_round_off
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     position_response = None if problem.solver.iterative else partial(bodies.position_response, constraints, dofs)
-    springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
-    soft_iterations, slip_so_far, round_off = 0, None, state.gap_round_off
     if position_response is not None:
         # Displacements without contact forces, which are large if bodies are flexible, cancel.
         round_off = max(round_off, SUM_ROUND_OFF * largest(step.loaded.full_solution(np.zeros(dofs.T.shape[1]))))
-    in_increments = isinstance(step.path, Path)
+    in_increments, on_soft_springs = isinstance(step.path, Path), None
     if constraints.tangents and (position_response is not None or in_increments):
         # With stiff springs, a problem with friction may have several solutions, and none near the position of equilibrium.
         slides, last_frictional = in_increments or not iterate.history, iterate.frictional
-        softly_held = solve_at(start, bodies.with_soft_springs(step.loaded, dofs, loads[0], slides))
-        soft_iterations, slip_so_far = softly_held.iterations, softly_held.slip_so_far
-        if softly_held.settled:
-            start = start + softly_held.u[springs]
+        soft_springs = bodies.with_soft_springs(step.loaded, dofs, contact.loads[0], slides)
+        on_soft_springs = contact.solve_at(start, soft_springs)
+        if on_soft_springs.settled:
+            start = start + on_soft_springs.u[dofs.springs]
         elif in_increments:
-            return softly_held, dofs.displacement(softly_held.u, lift + bodies.rigid(start))
+            return on_soft_springs, contact.guess[dofs.active]
         else:
             iterate.frictional = last_frictional
         if in_increments:  # stiff springs are slack only at the end of the step
-            step = replace(step, path=slip_so_far)
-    rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, round_off)
+            contact.step = replace(step, path=on_soft_springs.slip_so_far)
+    rigid = bodies.settle(
+        contact.solve_at,
+        position_response,
+        dofs.springs,
+        start,
+        state.largest_rigid_force,
+        relative_accuracy,
+        round_off,
+    )
     if rigid.solution.settled and not rigid.slack:
-        gaps = gap_changes(problem.model, bodies.motions)
-        raise failure(not_restrained(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
-    iterate.rigid = rigid
-    iterations = rigid.solution.iterations + soft_iterations
-    solution = replace(rigid.solution, iterations=iterations, slip_so_far=slip_so_far)
+        gaps, has_friction = gap_changes(problem.model, bodies.motions), bool(constraints.friction.any())
+        raise contact.failure(not_restrained(bodies, rigid, state.largest_rigid_force, has_friction, gaps))
+    iterate.rigid, solution = rigid, rigid.solution
+    if on_soft_springs is not None:
+        iterations = solution.iterations + on_soft_springs.iterations
+        solution = replace(solution, iterations=iterations, slip_so_far=on_soft_springs.slip_so_far)
     respond = solution.response
     if position_response is not None and respond is not None:
         solution = replace(solution, response=lambda: position_response(respond()).respond)
-    return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.anchor))
+    return solution, contact.guess[dofs.active]
+
+
+@dataclass(eq=False)
+class _FloatingContact:
+    """Contact problem of one pairing with bodies on springs, and the guess for its next solution.
+
+    Attributes
+    ----------
+    step, bodies, constraints, iterate, accuracy
+        See `_with_floating_bodies`.
+    active : ndarray of bool (m,)
+        Initial active set of the next solution.
+    guess : ndarray (n_dofs,)
+        Displacements of the last solution, the initial guess of the next one [length].
+    """
+
+    step: StepContext
+    bodies: FloatingBodies
+    constraints: Constraints
+    iterate: Iterate
+    accuracy: Accuracy
+    active: Mask
+    guess: Array
+
+    @cached_property
+    def loads(self) -> tuple[Array, float]:
+        """Generalised forces (k,) of the loads in the free rigid-body modes [force], and the size of the model [length]."""
+        problem, force = self.step.problem, self.step.load.force
+        if (
+            u := problem.linearised_at
+        ) is not None:  # residual forces, since a loaded tangent resists rigid-body rotations
+            force = force - problem.system.K @ self.bodies.strained(u)
+        model_size = float(np.ptp(problem.model.mesh.points, axis=0).max())
+        return generalised_forces(self.bodies.motions, force, self.step.state.largest_rigid_force), model_size
+
+    def solve_at(self, anchor: Array, loaded: Loaded | None = None) -> Solution:
+        """Return the solution with springs anchored at a rigid position (k,) [length]; `loaded` may contain other springs."""
+        lift, dofs = self.step.load.lift + self.bodies.rigid(anchor), self.step.problem.dofs
+        step = self.step if loaded is None else replace(self.step, loaded=loaded)
+        solution = _solve(step, self.constraints, self.iterate, self.active, self.accuracy, lift, self.guess)
+        self.active, self.guess = solution.wanted, self.guess.copy()
+        self.guess[dofs.active] = dofs.displacement(solution.u, lift)
+        return solution
+
+    def first_position(self) -> Array:
+        """Return the first position (k,) of the springs in a load step [length].
+
+        If no constraint is active, it is the position at which contact stops the rigid bodies under the loads, and the
+        constraints that are closed there become active.
+        """
+        bodies, constraints, u = self.bodies, self.constraints, self.guess
+        rows, gap0 = cone_rows(constraints)
+        shift = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, *self.loads)
+        if shift is None:
+            names = grouped_by_body(bodies.names)
+            text = f"the loads pull bodies away, and no contact stops them ({names}): reverse the loads or add supports"
+            raise self.failure(text, smaller_steps_help=False)
+        if (self.active & ~constraints.equality).any():
+            return u[bodies.dofs]
+        # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
+        gap = constraints.gap0 + constraints.B @ (u + bodies.rigid(shift))
+        self.active = self.active | constraints.usable & (gap <= SINGLE_PRECISION * self.loads[1])
+        return u[bodies.dofs] + shift
+
+    def failure(self, text: str, **options: bool) -> ConvergenceError:
+        """Return the error with a `text`, or with the coefficient of friction that would be needed."""
+        problem, motions = self.step.problem, self.bodies.motions
+        needed = needed_friction(self.constraints, motions, self.iterate.u, *self.loads)
+        text = text if needed is None else friction_exceeded(*needed, self.constraints.friction)
+        forces = self.step.load.force.reshape(problem.shape)
+        text += loose_bolts_remark(problem.model.pretensions, motions.displacement, forces)
+        return ConvergenceError(text, self.iterate.history, **options)

@@ -13,6 +13,8 @@ window then differ by hardly more than one change.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -37,31 +39,32 @@ WINDOW = 8
 DECLINE = 0.5
 
 
+@dataclass(eq=False)
 class Tolerances:
     """The tolerances of a load step.
 
-    Parameters
+    Attributes
     ----------
     solver : LinearSolver
     criteria : Criteria
-    first_residual : float
-        Largest relative residual of the first solution, unless the tolerance of the solver is larger [-].
+    residual : float
+        Relative residual at which the next linear solution stops; not less than the tolerance of the solver [-].
     round_off : float
         Bound of the round-off of gaps [length].
-    scale : float
+    first_scale : float
         Scale of the displacements in the first step, if only forces act [length].
     """
 
-    def __init__(
-        self, solver: LinearSolver, criteria: Criteria, first_residual: float, round_off: float, scale: float
-    ) -> None:
-        self._solver, self._criteria, self._round_off, self._first_scale = solver, criteria, round_off, scale
-        self._residual = max(solver.tolerance, first_residual)
+    solver: LinearSolver
+    criteria: Criteria
+    residual: float
+    round_off: float
+    first_scale: float
 
     @property
     def inexact(self) -> bool:
         """Whether the current tolerance is larger than that of the solver, so that the step cannot end yet."""
-        return self._solver.iterative and self._residual > self._solver.tolerance
+        return self.solver.iterative and self.residual > self.solver.tolerance
 
     def tighten(self, relative_change: float, law_residual: float = 0.0) -> None:
         """Reduce the tolerance of linear solutions according to the last relative change of the displacements.
@@ -69,10 +72,10 @@ class Tolerances:
         `law_residual` is the residual of the friction law, relative to the largest force. It determines the tolerance if it
         exceeds the smaller of the change and the last tolerance, because the next Newton step is not more accurate.
         """
-        residual = RESIDUAL * min(self._residual, relative_change)
+        residual = RESIDUAL * min(self.residual, relative_change)
         if RESIDUAL * law_residual > residual:
-            residual = min(RESIDUAL * law_residual, LEAST_REDUCTION * self._residual)
-        self._residual = max(self._solver.tolerance, residual)
+            residual = min(RESIDUAL * law_residual, LEAST_REDUCTION * self.residual)
+        self.residual = max(self.solver.tolerance, residual)
 
     def accuracy(self, scale: float) -> Accuracy:
         """Return the tolerances and limits of the next contact solution, for displacements of the size `scale` [length].
@@ -80,12 +83,12 @@ class Tolerances:
         While linear solutions are inexact, surfaces are paired again after one iteration of the active set or one Newton step
         of friction.
         """
-        relative_error = max(10 * self._solver.tolerance, self._residual if self._solver.iterative else 0.0)
+        relative_error = max(10 * self.solver.tolerance, self.residual if self.solver.iterative else 0.0)
         return Accuracy(
-            gap=max(relative_error * (scale or self._first_scale), self._round_off),
+            gap=max(relative_error * (scale or self.first_scale), self.round_off),
             multiplier=relative_error,
-            residual=max(self._residual, self._solver.tolerance),
-            max_iterations=1 if self.inexact else self._criteria.max_active_set_iterations,
+            residual=self.residual,
+            max_iterations=1 if self.inexact else self.criteria.max_active_set_iterations,
             inexact=self.inexact,
         )
 
@@ -96,15 +99,15 @@ class Tolerances:
         """
         # The errors of iterative solutions are about the tolerance times the contrast of cells. Smaller changes are not
         # significant.
-        relative_error = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
-        return max(max(self._criteria.geometry, relative_error) * size, self._round_off)
+        relative_error = self.solver.tolerance * (self.solver.contrast if self.solver.iterative else 1.0)
+        return max(max(self.criteria.geometry, relative_error) * size, self.round_off)
 
 
+@dataclass(eq=False)
 class ScatterWindow:
     """The last displacements and contact forces of a geometry loop, which show whether they only scatter by round-off."""
 
-    def __init__(self) -> None:
-        self._window: deque[tuple[Array, Array, float]] = deque(maxlen=WINDOW)
+    _window: deque[tuple[Array, Array, float]] = field(default_factory=partial(deque, maxlen=WINDOW), init=False)
 
     def add(
         self, displacement: Array, force: Array, change: float, size: float, contraction: float = np.inf
