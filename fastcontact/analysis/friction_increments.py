@@ -14,7 +14,7 @@ import numpy as np
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
 from fastcontact.analysis.shared_nodes import SharedNodes
-from fastcontact.analysis.solution import Path, Solution
+from fastcontact.analysis.solution import LoadPath, Solution
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
@@ -51,7 +51,7 @@ class FrictionIncrements:
     ) -> StepContext:
         """Return the step in which a pairing at displacements u (n_dofs,) is solved.
 
-        It has a `Path` if increments are due, and is unchanged otherwise.
+        It has a `LoadPath` if increments are due, and is unchanged otherwise.
         """
         self.unfinished = False
         if not (self.due or self._outdated(constraints, u)):
@@ -108,7 +108,7 @@ def _slides(step: StepContext, constraints: StackedConstraints, solution: Soluti
     return bool(shear[frictional & (forces[0] == 0.0)].sum() > limit * capacity[frictional].sum())
 
 
-def _path(step: StepContext, constraints: StackedConstraints, nodes: SharedNodes | None) -> Path | None:
+def _path(step: StepContext, constraints: StackedConstraints, nodes: SharedNodes | None) -> LoadPath | None:
     """Return the path of a step with the gaps and forces at its beginning.
 
     None if no constraint is open there, or if the forces are unknown.
@@ -130,13 +130,13 @@ def _path(step: StepContext, constraints: StackedConstraints, nodes: SharedNodes
     if nodes is not None:
         gap, normal, traction, slips = nodes.of_representatives(constraints, gap, normal, traction, slips)
     waiting = (gap > LENGTH_ROUND_OFF * size) & ~constraints.equality
-    return Path(gap, normal, traction, slips, waiting) if waiting.any() else None
+    return LoadPath(gap, normal, traction, slips, waiting) if waiting.any() else None
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
     """Return the tangential relative displacements (m, dim) that close the gaps (m,) if normals are inclined [length].
 
-    They are not slip, see `Path`. The constraints contain them as `slip0`, for the gaps of the last pairing at the
+    They are not slip, see `LoadPath`. The constraints contain them as `slip0`, for the gaps of the last pairing at the
     displacements at the beginning of the step. Here they are scaled to `gap`.
     """
     closing = np.zeros_like(constraints.positions)

@@ -146,7 +146,7 @@ def _settle(
         if increments.unfinished:
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
-            step = replace(step, path=solution.slip_so_far)
+            step = replace(step, path=solution.last_increment)
             mixing, window = _Mixing(step), ScatterWindow()
         before = iterate.u[problem.dofs.active]
         change = largest(displacement - before)

@@ -17,7 +17,7 @@ from fastcontact.analysis.convergence_messages import friction_exceeded, not_res
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, Path, SlipSoFar, Solution, in_last_increment, over_whole_step
+from fastcontact.analysis.solution import Accuracy, LastIncrement, LoadPath, Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import AnyArray, Array, Mask, largest
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
@@ -134,7 +134,7 @@ class StepContext:
         Number of the step.
     condensed_size : float
         Largest absolute value of the unknowns that are condensed, at the beginning of the step [length].
-    path : Path or SlipSoFar, optional
+    path : LoadPath or LastIncrement, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
     """
@@ -146,7 +146,7 @@ class StepContext:
     expected: float = 0.0
     index: int = 0
     condensed_size: float = 0.0
-    path: Path | SlipSoFar | None = None
+    path: LoadPath | LastIncrement | None = None
 
     @property
     def linearises_contact(self) -> bool:
@@ -233,11 +233,13 @@ def _solve(
     from fastcontact.analysis.friction import solve as friction
 
     condensed = replace(condensed, driven=step.driven(constraints))
-    slip_so_far = step.path if isinstance(step.path, SlipSoFar) and len(step.path.slip) == len(constraints) else None
-    path = step.path if isinstance(step.path, Path) else None
-    condensed = condensed if slip_so_far is None else in_last_increment(condensed, slip_so_far)
-    solution = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional, path)
-    iterate.frictional = solution if slip_so_far is None else over_whole_step(solution, slip_so_far)
+    if isinstance(step.path, LastIncrement) and len(step.path.slip) == len(constraints):
+        condensed = step.path.since_its_beginning(condensed)
+        solution = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional)
+        iterate.frictional = step.path.over_whole_step(solution)
+    else:
+        path = step.path if isinstance(step.path, LoadPath) else None
+        iterate.frictional = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional, path)
     return iterate.frictional
 
 
@@ -259,7 +261,7 @@ def _with_floating_bodies(
     if position_response is not None:
         # Displacements without contact forces, which are large if bodies are flexible, cancel.
         round_off = max(round_off, SUM_ROUND_OFF * largest(step.loaded.full_solution(np.zeros(dofs.T.shape[1]))))
-    in_increments, on_soft_springs = isinstance(step.path, Path), None
+    in_increments, on_soft_springs = isinstance(step.path, LoadPath), None
     if constraints.tangents and (position_response is not None or in_increments):
         # With stiff springs, a problem with friction may have several solutions, and none near the position of equilibrium.
         slides, last_frictional = in_increments or not iterate.history, iterate.frictional
@@ -272,7 +274,7 @@ def _with_floating_bodies(
         else:
             iterate.frictional = last_frictional
         if in_increments:  # stiff springs are slack only at the end of the step
-            contact.step = replace(step, path=on_soft_springs.slip_so_far)
+            contact.step = replace(step, path=on_soft_springs.last_increment)
     rigid = bodies.settle(
         contact.solve_at,
         position_response,
@@ -288,7 +290,7 @@ def _with_floating_bodies(
     iterate.rigid, solution = rigid, rigid.solution
     if on_soft_springs is not None:
         iterations = solution.iterations + on_soft_springs.iterations
-        solution = replace(solution, iterations=iterations, slip_so_far=on_soft_springs.slip_so_far)
+        solution = replace(solution, iterations=iterations, last_increment=on_soft_springs.last_increment)
     respond = solution.response
     if position_response is not None and respond is not None:
         solution = replace(solution, response=lambda: position_response(respond()).respond)

@@ -64,7 +64,7 @@ class Accuracy:
 Response = Callable[[Array, Array], Array]
 
 
-def response(loaded: Loaded, R: csr_array, place: Indices, forces_of: Callable[[Array], Array]) -> Response:
+def response(loaded: Loaded, R: csr_array, positions: Indices, forces_of: Callable[[Array], Array]) -> Response:
     """Return the `Response` of a contact problem with q gaps and slips.
 
     Parameters
@@ -73,7 +73,7 @@ def response(loaded: Loaded, R: csr_array, place: Indices, forces_of: Callable[[
         Prepared matrix (n, n) with any right-hand side.
     R : csr_array (q, n)
         Derivatives of gaps and of slips [-].
-    place : ndarray of int (q,)
+    positions : ndarray of int (q,)
         Their positions in arrays (1 + k, m) of the gaps and slips of all constraints.
     forces_of : callable
         Function that returns the change (q,) of their normal and tangential forces [force], given a change (q,) of the gaps
@@ -83,14 +83,14 @@ def response(loaded: Loaded, R: csr_array, place: Indices, forces_of: Callable[[
 
     def respond(force: Array, gaps: Array) -> Array:
         u = loaded.full_solution(force) - without_force
-        return u + loaded.full_solution(transpose @ forces_of(R @ u + gaps.ravel()[place])) - without_force
+        return u + loaded.full_solution(transpose @ forces_of(R @ u + gaps.ravel()[positions])) - without_force
 
     return respond
 
 
 @dataclass(frozen=True, eq=False)
-class Forces:
-    """Solution of Newton's method, or the best iterate if it has not converged.
+class FrictionSolution:
+    """Forces of a problem with friction by Newton's method, or those of its best iterate if it has not converged.
 
     Attributes
     ----------
@@ -119,14 +119,14 @@ class Forces:
 
 # Function that solves an increment, given gaps and slips (1 + k, m) [length] to be added, the constraints (m,) that may
 # close, those of them that are closed initially, and initial forces (1 + k, m) [force] or None.
-IncrementSolver = Callable[[Array, Mask, Mask, Array | None], Forces]
+IncrementSolver = Callable[[Array, Mask, Mask, Array | None], FrictionSolution]
 # Number of constraints that may close in one increment, relative to the number of closed ones. In 3D `in_increments`
 # admits more while few are closed.
 GROWTH = 1 / 32
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class LoadPath:
     """Data of the constraints at the beginning of a load step, for friction along the load path in increments.
 
     Attributes
@@ -165,7 +165,7 @@ class Path:
 
 
 @dataclass(frozen=True, eq=False)
-class SlipSoFar:
+class LastIncrement:
     """Data of the constraints at the beginning of the last increment of a load step.
 
     Attributes
@@ -190,6 +190,21 @@ class SlipSoFar:
     integrals: Array
     normal: Array
     begin: float
+
+    def since_its_beginning(self, constraints: Constraints) -> Constraints:
+        """Return the constraints with slips measured from the beginning of the increment."""
+        before = (self.slip * np.stack(constraints.directions)).sum(axis=2)
+        return replace(constraints, slip0=constraints.slip0 - before)
+
+    def over_whole_step(self, solution: Solution) -> Solution:
+        """Return the solution with the slips and the integrals of the step, given the solution of its last increment."""
+        directions = np.stack(solution.directions, axis=1)
+        vectors = self.slip, self.slip_before_closing, self.traction
+        before, slip_before_closing, traction = ((v[:, None] * directions).sum(axis=2) for v in vectors)
+        forces = np.vstack([self.normal, traction.T]), np.vstack([solution.multiplier, solution.tangential.T])
+        integrals = self.integrals + _integrals(*forces, solution.slip.T, 1.0 - self.begin)
+        slip = solution.slip + before
+        return replace(solution, slip=slip, integrals=integrals, slip_before_closing=slip_before_closing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +245,7 @@ class Solution:
         increments.
     slip_before_closing : ndarray (m, k), optional
         Part of `slip` before the constraint closed in this step [length]; only if the step is solved in increments.
-    slip_so_far : SlipSoFar, optional
+    last_increment : LastIncrement, optional
         Data at the beginning of the last increment; only if the step is solved in increments.
     """
 
@@ -249,7 +264,7 @@ class Solution:
     response: Callable[[], Response] | None = field(default=None, repr=False)
     integrals: Array | None = None
     slip_before_closing: Array | None = None
-    slip_so_far: SlipSoFar | None = None
+    last_increment: LastIncrement | None = None
 
     @classmethod
     def frictionless(cls, u: Array, multiplier: Array, gap: Array, active: Mask, wanted: Mask) -> Solution:
@@ -271,7 +286,7 @@ class Solution:
 
 def in_increments(
     lag: Array, closing: Array, y: Array, waiting: Mask, solve: IncrementSolver
-) -> tuple[Forces, Array, tuple[Array, Array, Array, Array, Array, float]]:
+) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array, float]]:
     """Return the forces at the end of a load step that is solved in increments, which end where constraints close.
 
     Parameters
@@ -279,7 +294,7 @@ def in_increments(
     lag : ndarray (1 + k, m)
         Gaps and slips at the beginning of the step, minus those at its end if contact forces did not change [length].
     closing : ndarray (1 + k, m)
-        Gaps at the beginning of the step, and the slips that closing them would add, see `Path.along` [length].
+        Gaps at the beginning of the step, and the slips that closing them would add, see `LoadPath.along` [length].
     y : ndarray (1 + k, m)
         Normal and tangential forces at the beginning of the step [force].
     waiting : ndarray of bool (m,)
@@ -288,12 +303,13 @@ def in_increments(
 
     Returns
     -------
-    forces : Forces
+    forces : FrictionSolution
         Forces at the end of the step, with the slips of the last increment.
     gaps : ndarray (1 + k, m)
         Gaps at the end of the step, and the slips of the whole step [length].
     before : tuple
-        Attributes of `SlipSoFar`, where components (k, m) along the tangents replace the vectors.
+        Data of `LastIncrement`: the components (3, k, m) of its three vectors along the tangents, and its attributes
+        `integrals`, `normal` and `begin`.
     """
     closed, slip, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), 0, True
     integrals = np.zeros((2, lag.shape[1]))
@@ -302,7 +318,7 @@ def in_increments(
     added = np.where(gap > 0.0, closing[1:], 0.0)
     lag = lag + np.vstack([np.zeros_like(gap), added])
 
-    def increment(end: float) -> Forces:
+    def increment(end: float) -> FrictionSolution:
         remaining = (1.0 - end) * lag
         remaining[1:] -= slip
         return solve(remaining, ~waiting, closed, y if y.any() else None)
@@ -328,7 +344,7 @@ def in_increments(
             waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
-        before = slip, slip_before_closing, y[1:], integrals, y[0], begin
+        before = np.stack([slip, slip_before_closing, y[1:]]), integrals, y[0], begin
         integrals = integrals + _integrals(y, forces.y, forces.gaps[1:], end - begin)
         total_slip = slip + forces.gaps[1:]
         slip = slip_after(forces.gaps[1:], forces.gaps[0])
@@ -370,19 +386,3 @@ def _integrals(before: Array, after: Array, slip: Array, duration: float) -> Arr
     at_begin, at_end = (-0.5 * (forces[1:] * slip).sum(axis=0) for forces in (before, after))
     work = np.where(after[0] > 0.0, (1.0 + ratio) * at_end, np.maximum(at_begin, 0.0))
     return np.stack([work, 0.5 * duration * (before[0] + after[0])])
-
-
-def in_last_increment(constraints: Constraints, slip_so_far: SlipSoFar) -> Constraints:
-    """Return the constraints with slips measured from the beginning of the last increment."""
-    before = (slip_so_far.slip * np.stack(constraints.directions)).sum(axis=2)
-    return replace(constraints, slip0=constraints.slip0 - before)
-
-
-def over_whole_step(solution: Solution, slip_so_far: SlipSoFar) -> Solution:
-    """Return the solution with the slips and the integrals of the step, given the solution of its last increment."""
-    directions = np.stack(solution.directions, axis=1)
-    vectors = slip_so_far.slip, slip_so_far.slip_before_closing, slip_so_far.traction
-    before, slip_before_closing, traction = ((v[:, None] * directions).sum(axis=2) for v in vectors)
-    forces = (np.vstack([slip_so_far.normal, traction.T]), np.vstack([solution.multiplier, solution.tangential.T]))
-    integrals = slip_so_far.integrals + _integrals(*forces, solution.slip.T, 1.0 - slip_so_far.begin)
-    return replace(solution, slip=solution.slip + before, integrals=integrals, slip_before_closing=slip_before_closing)

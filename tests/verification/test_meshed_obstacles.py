@@ -154,7 +154,7 @@ def test_a_ball_with_friction_is_solved_by_default(element):
 
 
 def test_the_remedy_for_a_full_compliance_that_is_too_large_works(monkeypatch):
-    monkeypatch.setattr("fastcontact.analysis.friction.solve.MAX_ROWS_WITH_FRICTION", 50)
+    monkeypatch.setattr("fastcontact.analysis.friction.delassus.MAX_ROWS_WITH_FRICTION", 50)
     refused = under_a_ball("hex20", 1.2, friction=0.3, formulation="continuous")
     with pytest.raises(
         fc.ContactError, match=r'formulation="mortar" with multipliers="dual", with linear_solver="amg"'

@@ -33,7 +33,7 @@ import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array
 
 from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
-from fastcontact.analysis.solution import Forces
+from fastcontact.analysis.solution import FrictionSolution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
@@ -137,7 +137,7 @@ class Linearised(Protocol):
 def newton(
     problem: Linearised, y: Array, gaps: Array, tolerance: float = ROUND_OFF, max_iterations: int | None = None,
     line_search: bool = True, min_iterations: int = 0,
-) -> Forces:  # fmt: skip
+) -> FrictionSolution:  # fmt: skip
     """Return the zero of the residual, or the best iterate.
 
     Parameters
@@ -185,7 +185,7 @@ def newton(
         norm = float(np.linalg.norm(residual))
     if not settled:
         y, gaps, relative = best
-    return Forces(y, gaps, *law.state(y, gaps), settled, relative, iteration)
+    return FrictionSolution(y, gaps, *law.state(y, gaps), settled, relative, iteration)
 
 
 # Compliance of a prescribed slip relative to the compliance of its gap. It is negligible, but with it the equation of stick
@@ -241,9 +241,14 @@ def aligning_rotation(compliance: Array, directions: tuple[Array, ...] = ()) -> 
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
 
 
-def rotated(Q: csr_array, values: Array) -> Array:
-    """Return the product of Q ((1 + k) m, (1 + k) m) with values (1 + k, m) along normals and tangents."""
-    return np.asarray(Q @ values.ravel()).reshape(values.shape)
+def rotated(Q: csr_array | None, values: Array) -> Array:
+    """Return the product of Q ((1 + k) m, (1 + k) m) with values (1 + k, m) along normals and tangents; None is identity."""
+    return values if Q is None else np.asarray(Q @ values.ravel()).reshape(values.shape)
+
+
+def rotated_back(Q: csr_array | None, values: Array) -> Array:
+    """Return the product of the transpose of Q with values (1 + k, m), see `rotated`."""
+    return rotated(None if Q is None else Q.T, values)
 
 
 def _angles_to_axes(tangent: Array, second_tangent: Array) -> Array:

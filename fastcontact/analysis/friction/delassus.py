@@ -12,9 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.linalg import block_diag
+from scipy.sparse import csc_array, csr_array, diags_array, hstack
 
 from fastcontact.arrays import Array, Indices
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.pairing import normals
+from fastcontact.linear.delassus import MAX_ROWS_WITH_FRICTION, check_rows
+from fastcontact.linear.protocol import Loaded
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
@@ -74,8 +79,16 @@ class Delassus:
             return Delassus(self.d * units**2, units[:, None] * self.S * units)
         return Delassus(self.d * units**2, self.S, scaled(self.U, units))
 
-    def rotated(self, Q: csr_array) -> Delassus:
-        """Return ``Q F Q.T`` for a matrix Q (n, n) that only rotates components with the same value of d."""
+    def decoupled(self, n: Indices, diagonal: Array) -> Delassus:
+        """Return F with zeros in the rows and columns `n` (q,), except for the values `diagonal` (q,) on the diagonal."""
+        units, softness = np.ones(len(self)), np.zeros(len(self))
+        units[n], softness[n] = 0.0, diagonal
+        return self.scaled(units).softened(softness)
+
+    def rotated(self, Q: csr_array | None) -> Delassus:
+        """Return ``Q F Q.T`` for a matrix Q (n, n) that only rotates components with the same value of d; F without Q."""
+        if Q is None:
+            return self
         if self.U is None:
             return Delassus(self.d, np.asarray(Q @ (Q @ self.S).T))
         return replace(self, U=csr_array(Q @ self.U))
@@ -116,3 +129,51 @@ class Delassus:
             return bool(np.diag(np.linalg.cholesky(matrix)).min() ** 2 < LENGTH_ROUND_OFF)
         except np.linalg.LinAlgError:
             return True
+
+
+def of_rows(loaded: Loaded, R: csr_array, factored: bool) -> tuple[Array, Delassus]:
+    """Return the gaps and slips (n,) without contact forces, and their Delassus operator, `factored` with U = R or not."""
+    if not factored:
+        check_rows(R.shape[0], MAX_ROWS_WITH_FRICTION)
+        free, F = loaded.delassus(R)
+        return free, Delassus(np.zeros(len(F)), F)
+    involved = np.unique(R.indices)
+    check_rows(len(involved), MAX_ROWS_WITH_FRICTION)
+    identity = np.ones(len(involved)), (np.arange(len(involved)), involved)
+    u, inverse = loaded.delassus(csr_array(identity, (len(involved), R.shape[1])))
+    U = csr_array(R[:, involved])
+    return U @ u, Delassus(np.zeros(U.shape[0]), inverse, U)
+
+
+def with_compliance(F: Delassus, constraints: Constraints, rows: Indices, components: Indices) -> Delassus:
+    """Return the sum of the Delassus operator F and the compliance of the constraints `rows` (q,).
+
+    `components` (n,) are the positions, in arrays (1 + k, q), of the components that belong to F.
+    """
+    number, dim = components % len(rows), constraints.positions.shape[1]  # of the constraint of each component
+    Z = np.concatenate(constraints.low_rank_compliance[:, rows])[components]
+    if constraints.compliance is not None:
+        # C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
+        # directions, which vary from one constraint to the next.
+        along = np.stack(constraints.coupled_directions or constraints.directions)[:, rows]
+        normal = normals(list(along))
+        normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
+        frame = np.concatenate([normal[None], along]).reshape(-1, dim)[components]
+    if F.U is not None:
+        assert constraints.compliance is not None
+        d, P, inverse_mass = constraints.compliance.split(rows)
+        added = np.where(d > 0.0, 0.0, F.diagonal()[: len(rows)])  # and subtracted in the next term
+        (rigid,) = np.nonzero(added[number])
+        columns = [scaled(P[number], along_axis) for along_axis in frame.T]
+        columns += [csr_array((np.ones(len(rigid)), (rigid, np.arange(len(rigid)))), (len(F), len(rigid)))]
+        S = block_diag(F.S, *dim * [-inverse_mass], -np.diag(added[number[rigid]]), np.eye(Z.shape[1]))
+        U = csc_array(hstack([F.U, *columns, csr_array(Z)], format="csc"))
+        used = np.flatnonzero(np.diff(U.indptr))
+        F = Delassus(F.d + (d + added)[number], S[np.ix_(used, used)], csr_array(U[:, used])).in_accurate_form()
+        check_rows(len(F) if F.U is None else len(used), MAX_ROWS_WITH_FRICTION)
+    else:
+        if constraints.compliance is not None:
+            F.S[:] += constraints.compliance.block(rows)[np.ix_(number, number)] * (frame @ frame.T)
+        if Z.size:
+            F.S[:] += Z @ Z.T
+    return F.softened(np.append(constraints.softness[rows], np.zeros(len(F) - len(rows))))

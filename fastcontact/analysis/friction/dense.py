@@ -17,7 +17,7 @@ With large coefficients of friction the solution may not be unique. The methods 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -26,8 +26,8 @@ from scipy.sparse import csr_array, eye_array
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction.cone_newton import Law, newton
 from fastcontact.analysis.friction.delassus import Delassus
-from fastcontact.analysis.solution import Forces
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.analysis.solution import FrictionSolution
+from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.linear.delassus import lu_solver
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, SUM_ROUND_OFF
 
@@ -45,7 +45,7 @@ REGULARISATION = ROUND_OFF, LENGTH_ROUND_OFF
 def solve(
     F: Delassus, free: Array, mu: Array, closed: Mask, guess: Array | None = None, equality: Mask | None = None,
     components: Indices | None = None,
-) -> Forces:  # fmt: skip
+) -> FrictionSolution:  # fmt: skip
     """Return the forces that satisfy unilateral contact and Coulomb's law.
 
     Parameters
@@ -70,16 +70,16 @@ def solve(
 
     Returns
     -------
-    Forces
+    FrictionSolution
         Contact forces, gaps and slips, and whether the solution has converged.
     """
     m = free.shape[1]
     equality = np.zeros(m, bool) if equality is None else equality
     law = Law(np.where(equality, 0.0, mu), equality)
     if not m:
-        return Forces(free * 0.0, free, closed, closed, True, 0.0, 0)
+        return FrictionSolution(free * 0.0, free, closed, closed, True, 0.0, 0)
     unit = _units(F, m)
-    length = float(np.abs(free * unit).max()) or 1.0
+    length = largest(free * unit) or 1.0
     components = np.arange(free.size) if components is None else components
     units = unit[components % m]
     F, best, iterations, elastic_slip = F.scaled(units), None, 0, 0.0
@@ -88,15 +88,15 @@ def solve(
     for compliance in REGULARISATION if F.is_singular else (0.0,):
         regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
         F = F.softened(scattered(np.full(len(regularised), compliance), regularised, (len(F),)))
-        problem = _Problem(F, free * unit / length, law, components)
+        scaled_free = free * unit / length
+        problem = _Problem(F, scaled_free, law, components, SUM_ROUND_OFF * largest(scaled_free))
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
             # which is common to all constraints, although gaps of constraints with a large compliance are not closed.
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, min_iterations=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
-                largest = float(np.abs(forces.y.ravel()[components[regularised]]).max(initial=0.0))
-                best, elastic_slip = forces, compliance * largest
+                best, elastic_slip = forces, compliance * largest(forces.y.ravel()[components[regularised]])
             if forces.settled:
                 break
         if best is not None and best.settled and elastic_slip <= SINGLE_PRECISION:
@@ -106,18 +106,23 @@ def solve(
     settled = (best.settled or best.residual <= LENGTH_ROUND_OFF) and not jammed
     residual = max(best.residual, elastic_slip) if jammed else best.residual
     gaps = best.gaps * length / unit
-    return Forces(best.y * length * unit, gaps, best.closed, best.sticking | equality, settled, residual, iterations)
+    return FrictionSolution(
+        best.y * length * unit, gaps, best.closed, best.sticking | equality, settled, residual, iterations
+    )
 
 
+@dataclass(eq=False)
 class _Problem:
     """The problem of `solve` in scaled units, for `cone_newton.newton`; see `cone_newton.Linearised`.
 
     F is scaled such that the compliance of each gap is one.
     """
 
-    def __init__(self, F: Delassus, free: Array, law: Law, components: Indices) -> None:
-        self.F, self.free, self.law, self.components = F, free, law, components
-        self.round_off = SUM_ROUND_OFF * float(np.abs(free).max())
+    F: Delassus
+    free: Array
+    law: Law
+    components: Indices
+    round_off: float
 
     def gaps(self, y: Array) -> Array:
         """Return gaps and slips (1 + k, m) for forces y (1 + k, m)."""
@@ -162,7 +167,7 @@ class _Problem:
         """
         compliance, last, halvings = NOTABLE, 1.0, 0
         while compliance > ROUND_OFF and halvings <= HALVINGS:
-            softened = _Problem(self.F.softened(compliance), self.free, self.law, self.components)
+            softened = replace(self, F=self.F.softened(compliance))
             forces = newton(softened, y, softened.gaps(y), min_iterations=1)
             if forces.settled:
                 y, last, compliance, halvings = forces.y, compliance, NOTABLE * compliance, 0
@@ -185,16 +190,21 @@ def numbers_at(at: Indices, shape: tuple[int, ...]) -> Indices:
     return result
 
 
+# Linear map from a change (n,) of the gaps and slips without forces to the change (n,) of the forces.
+ForceResponse = Callable[[Array], Array]
+
+
 @dataclass(frozen=True, eq=False)
 class _Equations:
-    """The equations of closed constraints for their q forces x: ``A z = -right(free)`` with ``x = -H free + back z``.
+    """The equations of closed constraints for their q forces x: ``A z = -S T free`` with ``x = -H free + back z``.
 
-    They are equivalent to ``(E + D F) x = -D free`` with E and D of `Law.linearised`; see `delassus`. The forces x are at
-    the positions `at` (q,) in arrays (1 + k, m).
+    They are equivalent to ``(E + D F) x = -D free`` with E and D of `Law.linearised`; see `delassus`. Without S, it is the
+    identity. The forces x are at the positions `at` (q,) in arrays (1 + k, m).
     """
 
     A: Array
-    right: Callable[[Array], Array]
+    S: Array | None
+    T: csr_array
     H: csr_array
     back: csr_array
     at: Indices
@@ -202,7 +212,8 @@ class _Equations:
     def forces(self, free: Array, solve: Callable[[Array], Array]) -> Array:
         """Return the forces (1 + k, m), where `solve` solves systems with A. `free` (1 + k, m) are gaps without forces."""
         values = free.ravel()[self.at]
-        return scattered(self.back @ solve(-self.right(values)) - self.H @ values, self.at, free.shape)
+        right_side = self.T @ values if self.S is None else self.S @ (self.T @ values)
+        return scattered(self.back @ solve(-right_side) - self.H @ values, self.at, free.shape)
 
 
 def _equations(
@@ -225,23 +236,22 @@ def _equations(
         F_matrix[np.arange(n), np.arange(n)] += F.d
         A = np.asarray(D_matrix @ F_matrix)
         A += matrix(E)
-        return _Equations(A, lambda free: D_matrix @ free, csr_array((n, n)), csr_array(eye_array(n)), at)
+        return _Equations(A, None, D_matrix, csr_array((n, n)), csr_array(eye_array(n)), at)
     blocks, D_blocks = E + D * np.where(number >= 0, F.d[number], 1.0), D.transpose(2, 0, 1)
     H = matrix(np.asarray(np.linalg.solve(blocks.transpose(2, 0, 1), D_blocks)).transpose(1, 2, 0))
     HU, S = csr_array(H @ F.U), F.S
     T = csr_array(F.U.T @ H)
     A = np.asarray(csr_array((F.U.T @ HU).T) @ S).T + np.eye(len(S))
-    return _Equations(A, lambda free: S @ (T @ free), H, -HU, at)
+    return _Equations(A, S, T, H, -HU, at)
 
 
 def response(
-    F: Delassus, law: Law, forces: Forces, held_slips: Mask, Q: csr_array | None, components: Indices
-) -> Callable[[Array], Array]:
-    """Return a function that computes the derivative of the solution `forces`.
+    F: Delassus, law: Law, forces: FrictionSolution, held_slips: Mask, Q: csr_array | None, components: Indices
+) -> ForceResponse:
+    """Return the derivative of the solution `forces`, along the `components`.
 
-    The function returns the change (n,) of the forces due to a change (n,) of the gaps and slips without forces, both along
-    the `components`. F, the constraints of `law` and the components are those of `solve`. Q is the rotation of the tangents,
-    if these are rotated. Along the held tangents, `held_slips` (k, m), slips do not vary.
+    F, the constraints of `law` and the components are those of `solve`. Q is the rotation of the tangents, if these are
+    rotated. Along the held tangents, `held_slips` (k, m), slips do not vary.
     """
     if not forces.closed.any():
         return np.zeros_like

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import cone_newton
-from fastcontact.analysis.solution import Accuracy, Forces
+from fastcontact.analysis.solution import Accuracy, FrictionSolution
 from fastcontact.analysis.tolerances import RESIDUAL
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
@@ -45,7 +45,7 @@ LAW_TOLERANCE, ACCEPTABLE = 10.0, 300.0
 def solve(
     loaded: LoadedNonsymmetric, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array,
     forces: Array | None,
-) -> tuple[Array, Forces]:  # fmt: skip
+) -> tuple[Array, FrictionSolution]:  # fmt: skip
     """Return the unknowns (n,) [length] and the contact forces.
 
     Parameters
@@ -155,22 +155,19 @@ class Eliminated:
     def start(self, forces: Array | None) -> tuple[Array, Array]:
         """Return scaled forces and gaps (1 + k, m) at the initial unknowns, given initial `forces` (1 + k, m) [force]."""
         y = np.zeros_like(self._free) if forces is None else np.where(self._usable, forces, 0.0)
-        if self._rotation is not None:
-            y = cone_newton.rotated(self._rotation, y)
+        y = cone_newton.rotated(self._rotation, y)
         y[1:][~self._free_slips] = 0.0
         self.last_forces = y / self._unit
         return self.last_forces, self._scaled(self._gaps(self.u, y))
 
-    def unscaled(self, scaled: Forces) -> Forces:
+    def unscaled(self, scaled: FrictionSolution) -> FrictionSolution:
         """Return forces [force] and gaps [length] along the original tangents, from the last step.
 
         Whether constraints are closed or stick, the residual and the number of iterations are those of `scaled`.
         """
         y = self.last_forces * self._unit
-        gaps = self._gaps(self.u, y)
-        if self._rotation is not None:
-            y, gaps = (cone_newton.rotated(self._rotation.T, values) for values in (y, gaps))
-        return Forces(y, gaps, scaled.closed, scaled.sticking, scaled.settled, scaled.residual, 1 + scaled.iterations)
+        y, gaps = (cone_newton.rotated_back(self._rotation, values) for values in (y, self._gaps(self.u, y)))
+        return replace(scaled, y=y, gaps=gaps, iterations=1 + scaled.iterations)
 
     def _gaps(self, u: Array, forces: Array | float = 0.0) -> Array:
         """Return gaps and slips (1 + k, m) at unknowns u (n,) [length], with the compliance under `forces` [force]."""

@@ -12,37 +12,42 @@ without forming F.
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.sparse import csc_array, csr_array, hstack, vstack
+from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.friction import dense, eliminated
+from fastcontact.analysis.friction import delassus, dense, eliminated
 from fastcontact.analysis.friction.cone_newton import (
     SLIP_COMPLIANCE,
     Law,
     aligning_rotation,
     held_tangents,
     rotated,
+    rotated_back,
 )
 from fastcontact.analysis.friction.delassus import Delassus
 from fastcontact.analysis.friction.dense import numbers_at, scattered
-from fastcontact.analysis.solution import Accuracy, Forces, Path, SlipSoFar, Solution, in_increments, response
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.analysis.solution import (
+    Accuracy,
+    FrictionSolution,
+    LastIncrement,
+    LoadPath,
+    Solution,
+    in_increments,
+    response,
+)
+from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.pairing import normals
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.delassus import MAX_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
-from fastcontact.linear.sparse_rows import scaled
 
 log = logging.getLogger("fastcontact")
 
 
 def solve(
     loaded: Loaded, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array,
-    guess: Solution | None = None, path: Path | None = None,
+    guess: Solution | None = None, path: LoadPath | None = None,
 ) -> Solution:  # fmt: skip
     """Return the displacements and the contact forces that satisfy unilateral contact and Coulomb's law.
 
@@ -66,7 +71,7 @@ def solve(
         `Loaded.involved_solution` [length].
     guess : Solution, optional
         Solution of a similar problem, from whose forces to start; ignored if its number of constraints is different.
-    path : Path, optional
+    path : LoadPath, optional
         Data at the beginning of the step, if it is solved in increments along the load path.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
@@ -76,12 +81,11 @@ def solve(
         if solution is not None:
             return solution
         log.info("friction: the iteration on eliminated constraints did not converge, their compliance is formed")
-    usable = constraints.usable
-    initial = closed | constraints.equality if path is None else closed | constraints.equality | ~path.waiting
+    usable, iterations = constraints.usable, 0
+    initial = closed | constraints.equality | (False if path is None else ~path.waiting)
     included = usable if coupled else usable & initial
-    iterations = 0
     while True:
-        solution = _with_included(included, loaded, constraints, closed, u, forces, path)
+        solution = _with_included(np.flatnonzero(included), loaded, constraints, closed, u, forces, path)
         solution.gap[~usable], solution.slip[~usable] = np.inf, 0.0
         iterations += solution.iterations
         missing = usable & ~included & (solution.gap < 0.0)
@@ -92,161 +96,183 @@ def solve(
 
 def _eliminated(
     loaded: LoadedNonsymmetric, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array, forces: Array | None,
-    path: Path | None,
+    path: LoadPath | None,
 ) -> Solution | None:  # fmt: skip
     """Return the solution by `eliminated`, without the Delassus operator; None if this fails. Parameters as in `solve`."""
-    usable, before = constraints.usable, None
+    usable, all_rows, last_increment = constraints.usable, np.arange(len(constraints)), None
 
-    def solve_eliminated(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> Forces:
+    def solve_eliminated(constraints: Constraints, closed: Mask, forces: Array | None) -> FrictionSolution:
         nonlocal u
         u, result = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
         result.gaps[:, ~usable] = 0.0
         return result
 
-    def increment(offset: Array, carrying: Mask, closed: Mask, forces: Array | None) -> Forces:
+    def increment(offset: Array, carrying: Mask, closed: Mask, forces: Array | None) -> FrictionSolution:
         gaps = constraints.gaps_at_rest() + offset
         gaps[0, ~carrying] += distance
         shifted_constraints = replace(constraints, gap0=gaps[0], slip0=gaps[1:], elastic_slip=np.empty(0))
-        result = solve_eliminated(shifted_constraints, closed, accuracy, forces)
+        result = solve_eliminated(shifted_constraints, closed, forces)
         result.gaps[0, ~carrying] -= distance
         return result
 
     try:
         if path is None:
-            result = solve_eliminated(constraints, closed, accuracy, forces)
+            result = solve_eliminated(constraints, closed, forces)
         else:
-            y, closing = path.along(constraints.directions, np.arange(len(constraints)))
+            y, closing = path.along(constraints.directions, all_rows)
             end = loaded.full_solution(constraints.force(y[0], y[1:].T))
             lag = -constraints.gaps_at_rest() - np.stack([R @ end for R in (constraints.B, *constraints.tangents)])
             lag -= eliminated.diagonal_compliance(constraints) * y
             lag[0] += path.gap
             lag = np.where(usable, lag, 0.0)
-            distance = 4.0 * float(np.abs(lag[0]).max())  # further than constraints can close
+            distance = 4.0 * largest(lag[0])  # further than constraints can close
             result, gaps, before = in_increments(lag, closing, y, path.waiting, increment)
-            result = replace(result, gaps=gaps)
+            result, last_increment = replace(result, gaps=gaps), _last_increment(before, None, all_rows, constraints)
     except ConvergenceError:
         return None
     gap, active = np.where(usable, result.gaps[0], np.inf), result.closed & usable
     return Solution(
         u, result.y[0], gap, active, active, result.settled, result.iterations, result.y[1:].T, result.gaps[1:].T,
-        result.sticking, result.residual, constraints.directions,
-        slip_so_far=None if before is None else _slip_so_far(before, None, np.arange(len(constraints)), constraints),
+        result.sticking, result.residual, constraints.directions, last_increment=last_increment,
     )  # fmt: skip
 
 
 def _with_included(
-    included: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
+    rows: Indices, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None,
+    path: LoadPath | None,
 ) -> Solution:  # fmt: skip
-    """Return the solution with only the `included` constraints (m,), by the Delassus operator.
+    """Return the solution with only the included constraints, numbered `rows` (q,), by the Delassus operator.
 
     The gaps and slips of the other constraints follow from the displacements. The other parameters are those of `solve`, with
     initial `forces` (1 + k, m) or None [force].
     """
-    rows = np.flatnonzero(included)
     k, m = len(constraints.tangents), len(constraints)
-    # In arrays (1 + k, q), F has no rows for the slips of constraints whose pair has no friction.
     frictional = np.stack(constraints.directions)[:, rows].any(axis=(0, 2))
     components = np.flatnonzero(np.vstack([np.ones_like(frictional), *k * [frictional]]))
     all_rows = csr_array(vstack([constraints.B, *constraints.tangents], format="csr"))
     row_numbers = (np.arange(1 + k)[:, None] * m + rows).ravel()[components]
     R = all_rows[row_numbers]
-    gaps_at_rest = constraints.gaps_at_rest()
-    rigid_compliance = loaded.rigid_compliance(R)
-    # The compliance of soft springs is so large that the factored form would not be accurate.
-    factored = k == 2 and constraints.compliance is not None and not np.any(rigid_compliance)
-    free, F = _delassus(loaded, R, factored)
-    number = numbers_at(components, (1 + k, len(rows)))
-    slips = np.arange(len(rows), len(F))
-    # This compliance is added before held tangents are detected, since compliant tangents are not held.
-    F = F.softened(scattered(np.tile(constraints.tangential_softness[rows[frictional]], k), slips, (len(F),)))
-    Q = aligning_rotation(F.diagonal_blocks(number)) if k == 2 else None
-    Q_F = None if Q is None else csr_array(Q[components][:, components])
-    C = (F if Q_F is None else F.rotated(Q_F)).diagonal_blocks(number)
-    C[0, 0] += np.where(constraints.prescribed, constraints.softness, 0.0)[rows]
-    held_slips = held_tangents(C) & frictional
-    held_rows = number[1:][held_slips]
-    F = _with_compliance(F, constraints, rows, components)
-    if not factored:
-        F = replace(F, S=F.S + rigid_compliance)
-    free = scattered(free, components, number.shape) + gaps_at_rest[:, rows]
-    guess = None if forces is None else forces[:, rows]
-    y0, closing = np.zeros_like(free), np.zeros_like(free)
-    if path is not None:
-        y0, closing = path.along(constraints.directions, rows)
-    if Q is not None and Q_F is not None:
-        F = F.rotated(Q_F)
-        free, y0, closing = (rotated(Q, values) for values in (free, y0, closing))
-        guess = None if guess is None else rotated(Q, guess)
-    if len(held_rows):
-        prescribed = held_slips & constraints.imposes_slip(rows, Q)
-        values = np.where(prescribed, SLIP_COMPLIANCE * C[0, 0], F.diagonal().max())[held_slips]
-        F = F.scaled(1.0 - scattered(np.ones(len(values)), held_rows, (len(F),)))
-        F = F.softened(scattered(values, held_rows, (len(F),)))
-        free[1:][held_slips & ~prescribed] = 0.0
-        y0[1:][held_slips], closing[1:][held_slips] = 0.0, 0.0
-    mu, equations = constraints.friction[rows], constraints.equality[rows]
+    problem, last_increment = _included_problem(loaded, constraints, rows, R, components), None
     if path is None:
-        result, before = dense.solve(F, free, mu, closed[rows], guess, equations, components), None
+        guess = None if forces is None else rotated(problem.Q, forces[:, rows])
+        result = dense.solve(problem.F, problem.free, problem.mu, closed[rows], guess, problem.equality, components)
         gaps_of_included = result.gaps
     else:
-        lag = -free - scattered(F @ y0.ravel()[components], components, free.shape)
-        lag[0] += closing[0]
-
-        def increment(offset: Array, carrying: Mask, closed: Mask, start: Array | None) -> Forces:
-            gaps, at = free + offset, np.flatnonzero(carrying)
-            given = np.flatnonzero(number[:, at] >= 0)
-            n = number[:, at].ravel()[given]
-            start = None if start is None else start[:, at]
-            result = dense.solve(F.submatrix(n), gaps[:, at], mu[at], closed[at], start, equations[at], given)
-            y, (closed, sticking) = np.zeros_like(gaps), np.zeros((2, len(rows)), bool)
-            y[:, at], closed[at], sticking[at] = result.y, result.closed, result.sticking
-            gaps += scattered(F @ y.ravel()[components], components, gaps.shape)
-            return replace(result, y=y, gaps=gaps, closed=closed, sticking=sticking)
-
-        result, gaps_of_included, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
-    y = result.y
-    if Q is not None:
-        y, gaps_of_included = rotated(Q.T, y), rotated(Q.T, gaps_of_included)
+        y0, closing = (rotated(problem.Q, values) for values in path.along(constraints.directions, rows))
+        result, gaps_of_included, before = problem.in_increments(y0, closing, path.waiting[rows])
+        last_increment = _last_increment(before, problem.Q, rows, constraints)
+    y, gaps_of_included = rotated_back(problem.Q, result.y), rotated_back(problem.Q, gaps_of_included)
     u = loaded.involved_solution(R.T @ y.ravel()[components], u)
-    all_forces = np.zeros((1 + k, m))
-    gaps = gaps_at_rest + (all_rows @ u).reshape(1 + k, m)
+    all_forces, (active, sticking) = np.zeros((1 + k, m)), np.zeros((2, m), bool)
+    gaps = constraints.gaps_at_rest() + (all_rows @ u).reshape(1 + k, m)
     all_forces[:, rows], gaps[:, rows] = y, gaps_of_included
-    active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
-
-    # Constraints that are equations have no friction, and slips along held tangents do not vary.
-    mu = np.where(equations, 0.0, mu)
-    at_end = replace(result, sticking=result.sticking & ~equations)
     return Solution(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
-        sticking, result.residual, constraints.directions,
-        slip_so_far=None if before is None else _slip_so_far(before, Q, rows, constraints),
-        response=lambda: response(
-            loaded, R, row_numbers, dense.response(F, Law(mu, equations), at_end, held_slips, Q_F, components)
-        ),
+        sticking, result.residual, constraints.directions, last_increment=last_increment,
+        response=lambda: response(loaded, R, row_numbers, problem.force_response(result)),
     )  # fmt: skip
 
 
-def _delassus(loaded: Loaded, R: csr_array, factored: bool) -> tuple[Array, Delassus]:
-    """Return the gaps and slips (n,) without contact forces, and their Delassus operator, `factored` with U = R or not."""
+@dataclass(frozen=True, eq=False)
+class _IncludedProblem:
+    """Contact problem of q constraints with friction, in terms of their Delassus operator, with rotated tangents.
+
+    Attributes
+    ----------
+    F : Delassus (n, n)
+        Sum of the Delassus operator and the compliance of the constraints. It has no rows for the slips of constraints whose
+        pair has no friction; the slips along held tangents are decoupled from all other components.
+    free : ndarray (1 + k, q)
+        Gaps and slips without contact forces [length].
+    mu : ndarray (q,)
+        Coefficients of friction [-].
+    equality : ndarray of bool (q,)
+        Constraints that are equations.
+    components : ndarray of int (n,)
+        Positions, in arrays (1 + k, q), of the components that belong to F.
+    held_slips : ndarray of bool (k, q)
+        Tangents along which supports prevent slip.
+    Q : csr_array, optional
+        Rotation of the tangents, see `aligning_rotation`.
+    """
+
+    F: Delassus
+    free: Array
+    mu: Array
+    equality: Mask
+    components: Indices
+    held_slips: Mask
+    Q: csr_array | None
+
+    def _gap_changes(self, y: Array) -> Array:
+        """Return the gaps and slips (1 + k, q) due to forces y (1 + k, q)."""
+        return scattered(self.F @ y.ravel()[self.components], self.components, y.shape)
+
+    def in_increments(
+        self, y0: Array, closing: Array, waiting: Mask
+    ) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array, float]]:
+        """Return the solution along the load path, see `solution.in_increments`, given `LoadPath.along` (1 + k, q)."""
+        y0[1:][self.held_slips], closing[1:][self.held_slips] = 0.0, 0.0
+        lag = -self.free - self._gap_changes(y0)
+        lag[0] += closing[0]
+        return in_increments(lag, closing, y0, waiting, self._increment)
+
+    def _increment(self, offset: Array, carrying: Mask, closed: Mask, start: Array | None) -> FrictionSolution:
+        """See `solution.IncrementSolver`."""
+        gaps, at = self.free + offset, np.flatnonzero(carrying)
+        number = numbers_at(self.components, gaps.shape)[:, at]
+        components = np.flatnonzero(number >= 0)
+        F, start = self.F.submatrix(number.ravel()[components]), None if start is None else start[:, at]
+        result = dense.solve(F, gaps[:, at], self.mu[at], closed[at], start, self.equality[at], components)
+        y, (closed, sticking) = np.zeros_like(gaps), np.zeros((2, len(carrying)), bool)
+        y[:, at], closed[at], sticking[at] = result.y, result.closed, result.sticking
+        return replace(result, y=y, gaps=gaps + self._gap_changes(y), closed=closed, sticking=sticking)
+
+    def force_response(self, result: FrictionSolution) -> dense.ForceResponse:
+        """Return the derivative of the forces with respect to gaps and slips at the solution `result`."""
+        # Constraints that are equations have no friction, and slips along held tangents do not vary.
+        law = Law(np.where(self.equality, 0.0, self.mu), self.equality)
+        at_end = replace(result, sticking=result.sticking & ~self.equality)
+        Q = None if self.Q is None else csr_array(self.Q[self.components][:, self.components])
+        return dense.response(self.F, law, at_end, self.held_slips, Q, self.components)
+
+
+def _included_problem(
+    loaded: Loaded, constraints: Constraints, rows: Indices, R: csr_array, components: Indices
+) -> _IncludedProblem:
+    """Return the problem of the constraints `rows` (q,), where R (n, n_unknowns) are the derivatives of the `components`."""
+    k, q = len(constraints.tangents), len(rows)
+    rigid_compliance = loaded.rigid_compliance(R)
+    # The compliance of soft springs is so large that the factored form would not be accurate.
+    factored = k == 2 and constraints.compliance is not None and not np.any(rigid_compliance)
+    free, F = delassus.of_rows(loaded, R, factored)
+    number = numbers_at(components, (1 + k, q))
+    # This compliance is added before held tangents are detected, since compliant tangents are not held.
+    F = F.softened(
+        np.vstack([np.zeros((1, q)), *k * [constraints.tangential_softness[None, rows]]]).ravel()[components]
+    )
+    Q = aligning_rotation(F.diagonal_blocks(number)) if k == 2 else None
+    Q_F = None if Q is None else csr_array(Q[components][:, components])
+    C = F.rotated(Q_F).diagonal_blocks(number)
+    C[0, 0] += np.where(constraints.prescribed, constraints.softness, 0.0)[rows]
+    held_slips = held_tangents(C) & (number[1:] >= 0)
+    F = delassus.with_compliance(F, constraints, rows, components)
     if not factored:
-        check_rows(R.shape[0], MAX_ROWS_WITH_FRICTION)
-        free, F = loaded.delassus(R)
-        return free, Delassus(np.zeros(len(F)), F)
-    involved = np.unique(R.indices)
-    check_rows(len(involved), MAX_ROWS_WITH_FRICTION)
-    identity = np.ones(len(involved)), (np.arange(len(involved)), involved)
-    u, inverse = loaded.delassus(csr_array(identity, (len(involved), R.shape[1])))
-    U = csr_array(R[:, involved])
-    return U @ u, Delassus(np.zeros(U.shape[0]), inverse, U)
+        F = replace(F, S=F.S + rigid_compliance)
+    F = F.rotated(Q_F)
+    free = rotated(Q, scattered(free, components, number.shape) + constraints.gaps_at_rest()[:, rows])
+    if held_slips.any():
+        prescribed = held_slips & constraints.imposes_slip(rows, Q)
+        values = np.where(prescribed, SLIP_COMPLIANCE * C[0, 0], F.diagonal().max())[held_slips]
+        F = F.decoupled(number[1:][held_slips], values)
+        free[1:][held_slips & ~prescribed] = 0.0
+    return _IncludedProblem(F, free, constraints.friction[rows], constraints.equality[rows], components, held_slips, Q)
 
 
-def _slip_so_far(
-    before: tuple[Array, Array, Array, Array, Array, float],
-    Q: csr_array | None,
-    rows: Indices,
-    constraints: Constraints,
-) -> SlipSoFar:
+def _last_increment(
+    before: tuple[Array, Array, Array, float], Q: csr_array | None, rows: Indices, constraints: Constraints
+) -> LastIncrement:
     """Return the data at the beginning of the last increment, for all constraints.
 
     Parameters
@@ -260,48 +286,12 @@ def _slip_so_far(
     constraints : Constraints
         All m constraints.
     """
-    *components, integrals, normal, begin = before
-    if Q is not None:
-        no_gaps = np.zeros((1, len(rows)))
-        components = [rotated(Q.T, np.vstack([no_gaps, along]))[1:] for along in components]
+    components, integrals, normal, begin = before
+    no_gaps = np.zeros((1, len(rows)))
+    along_tangents = np.stack([rotated_back(Q, np.vstack([no_gaps, along]))[1:] for along in components])
     m, dim = constraints.positions.shape
-    all_vectors, all_integrals, all_normal = np.zeros((3, m, dim)), np.zeros((2, m)), np.zeros(m)
-    tangents = np.stack(constraints.directions)[:, rows]
-    all_vectors[:, rows] = np.einsum("pkm,kmd->pmd", np.stack(components), tangents)
+    vectors, all_integrals, all_normal = np.zeros((3, m, dim)), np.zeros((2, m)), np.zeros(m)
+    vectors[:, rows] = np.einsum("pkm,kmd->pmd", along_tangents, np.stack(constraints.directions)[:, rows])
     all_integrals[:, rows], all_normal[rows] = integrals, normal
-    slip, slip_before_closing, traction = all_vectors
-    return SlipSoFar(slip, slip_before_closing, traction, all_integrals, all_normal, begin)
-
-
-def _with_compliance(F: Delassus, constraints: Constraints, rows: Indices, components: Indices) -> Delassus:
-    """Return the sum of the Delassus operator F and the compliance of the constraints `rows` (q,).
-
-    `components` (n,) are the positions, in arrays (1 + k, q), of the components that belong to F.
-    """
-    at, dim = components % len(rows), constraints.positions.shape[1]
-    Z = np.concatenate(constraints.low_rank_compliance[:, rows])[components]
-    if constraints.compliance is not None:
-        # C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
-        # directions, which vary from one constraint to the next.
-        along = np.stack(constraints.coupled_directions or constraints.directions)[:, rows]
-        normal = normals(list(along))
-        normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
-        frame = np.concatenate([normal[None], along]).reshape(-1, dim)[components]
-    if F.U is not None:
-        assert constraints.compliance is not None
-        d, P, inverse_mass = constraints.compliance.split(rows)
-        added = np.where(d > 0.0, 0.0, F.diagonal()[: len(rows)])  # and subtracted in the next term
-        (rigid,) = np.nonzero(added[at])
-        columns = [scaled(P[at], along_axis) for along_axis in frame.T]
-        columns += [csr_array((np.ones(len(rigid)), (rigid, np.arange(len(rigid)))), (len(F), len(rigid)))]
-        S = block_diag(F.S, *dim * [-inverse_mass], -np.diag(added[at[rigid]]), np.eye(Z.shape[1]))
-        U = csc_array(hstack([F.U, *columns, csr_array(Z)], format="csc"))
-        used = np.flatnonzero(np.diff(U.indptr))
-        F = Delassus(F.d + (d + added)[at], S[np.ix_(used, used)], csr_array(U[:, used])).in_accurate_form()
-        check_rows(len(F) if F.U is None else len(used), MAX_ROWS_WITH_FRICTION)
-    else:
-        if constraints.compliance is not None:
-            F.S[:] += constraints.compliance.block(rows)[np.ix_(at, at)] * (frame @ frame.T)
-        if Z.size:
-            F.S[:] += Z @ Z.T
-    return F.softened(scattered(constraints.softness[rows], np.arange(len(rows)), (len(F),)))
+    slip, slip_before_closing, traction = vectors
+    return LastIncrement(slip, slip_before_closing, traction, all_integrals, all_normal, begin)

@@ -10,8 +10,7 @@ from scipy.sparse.linalg import splu
 
 import fastcontact as fc
 from fastcontact.analysis import newton, step_halving
-from fastcontact.analysis.friction import cone_newton, dense
-from fastcontact.analysis.friction import solve as friction
+from fastcontact.analysis.friction import cone_newton, delassus, dense
 from fastcontact.analysis.friction.cone_newton import (
     aligning_rotation,
     compliance_of_rows,
@@ -46,7 +45,7 @@ def componentwise(C, along):
     rows = csr_array((m, m * dim))
     positions = np.zeros((m, dim))
     constraints = Constraints(rows, np.zeros(m), positions, DenseCompliance(C), k * (rows,), tuple(along))
-    return friction._with_compliance(F, constraints, np.arange(m), np.arange(len(F))).S
+    return delassus.with_compliance(F, constraints, np.arange(m), np.arange(len(F))).S
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -226,13 +225,13 @@ def pressed_blocks(beside, driven):
 @pytest.mark.filterwarnings("ignore:.*oscillate from node to node")
 @pytest.mark.parametrize(("beside", "driven"), [(False, True), (True, True), (False, False)])
 def test_pressure_fields_are_solved_as_with_the_whole_matrix(beside, driven, monkeypatch):
-    model, operators, inner = pressed_blocks(beside, driven), [], friction._delassus
-    monkeypatch.setattr(friction, "_delassus", lambda *system: operators.append(inner(*system)) or operators[-1])
+    model, operators, inner = pressed_blocks(beside, driven), [], delassus.of_rows
+    monkeypatch.setattr(delassus, "of_rows", lambda *system: operators.append(inner(*system)) or operators[-1])
     (factored,) = fc.solve(model, 1)
     is_factored = [F.U is not None for _, F in operators]
     # A block that contact alone holds is first solved on soft springs, with the whole matrix.
     assert all(is_factored) if driven and not beside else any(is_factored)
-    monkeypatch.setattr(friction, "_delassus", lambda loaded, R, _: inner(loaded, R, False))
+    monkeypatch.setattr(delassus, "of_rows", lambda loaded, R, _: inner(loaded, R, False))
     (whole,) = fc.solve(model, 1)
     for name, contact in whole.contact.items():
         found, size = factored.contact[name], np.abs(contact.force_vectors).max()

@@ -315,7 +315,7 @@ def test_auto_knows_which_constraints_multigrid_cannot_eliminate():
 def test_a_full_compliance_that_would_take_hours_is_refused_with_the_alternative(solver, friction, monkeypatch):
     model = pressed(5, formulation="continuous", friction=friction)
     monkeypatch.setattr("fastcontact.linear.delassus.MAX_ROWS", 100)
-    monkeypatch.setattr("fastcontact.analysis.friction.solve.MAX_ROWS_WITH_FRICTION", 100)
+    monkeypatch.setattr("fastcontact.analysis.friction.delassus.MAX_ROWS_WITH_FRICTION", 100)
     expected = r"full compliance of \d+ constraints, .*GB .*formulation=\"mortar\" with multipliers=\"dual\""
     refused(fc.ContactError, expected, solved, model, solver)
 
