@@ -153,15 +153,6 @@ class StepContext:
         """Whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure."""
         return not (self.problem.solver.iterative or self.load.fluids)
 
-    @cached_property
-    def prescribed_motion(self) -> Array:
-        """Increment (n_dofs,) of the displacements in the step that supports and multi-point constraints impose [length].
-
-        It is the change of the displacements if all unknowns keep their values.
-        """
-        system, start, zero = self.problem.system, self.state.u, np.zeros_like(self.state.u)
-        return self.load.lift - (start - system.displacement(system.unknowns(start, zero), zero))
-
     def driven(self, constraints: Constraints) -> Array:
         """Return the slips imposed by supports and obstacles in the step.
 
@@ -172,11 +163,14 @@ class StepContext:
         ndarray (k, m)
             Imposed slip along each of k tangents of the m constraints [-].
         """
-        slips = np.empty_like(constraints.slip0)
+        system, start, slips = self.problem.system, self.state.u, np.empty_like(constraints.slip0)
+        zero = np.zeros_like(start)
+        # The change of the displacements if all unknowns keep their values. Without prescribed displacements in this step, it
+        # is the round-off of earlier displacements.
+        prescribed_motion = self.load.lift - (start - system.displacement(system.unknowns(start), zero))
         for k, T in enumerate(constraints.tangents):
-            slips[k] = T @ self.prescribed_motion
-        # Without prescribed displacements in this step, `prescribed_motion` is the round-off of earlier displacements.
-        scale = max(largest(self.prescribed_motion), largest(self.state.u))
+            slips[k] = T @ prescribed_motion
+        scale = max(largest(prescribed_motion), largest(start))
         if isinstance(constraints, StackedConstraints):
             begin, end = self.state.obstacles, self.load.obstacles
             for name, rows in constraints.rows.items():

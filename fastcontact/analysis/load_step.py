@@ -17,6 +17,7 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import unchecked
+from fastcontact.analysis import thermal_coupling
 from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
@@ -25,13 +26,6 @@ from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.resultants import reference_reactions
 from fastcontact.analysis.state import State
-from fastcontact.analysis.thermal_coupling import (
-    HeatSolution,
-    expansion_as_force,
-    first_rise,
-    settle_heat,
-    thermal_load,
-)
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, largest
@@ -71,46 +65,46 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     """
     load = load_without_conduction = problem.load_at(instant)
     if problem.heat is not None:
-        rise = first_rise(problem, problem.heat, state, instant)
-        load = thermal_load(problem, load_without_conduction, rise)
+        rise = thermal_coupling.first_rise(problem, problem.heat, state, instant)
+        load = thermal_coupling.thermal_load(problem, load_without_conduction, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
-    context = prepare_start(problem, state, index, load)
-    heat_solution, solution = None, newton(context, load)
+    step = prepare_start(problem, state, index, load)
+    heat_solution, solution = None, newton(step, load)
     if problem.heat is not None:
-        heat_solution, solution = settle_heat(
-            problem, context.state, load_without_conduction, instant, rise, solution, partial(newton, context)
+        heat_solution, solution = thermal_coupling.settle_heat(
+            problem, step.state, load_without_conduction, instant, rise, solution, partial(newton, step)
         )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
-    return _end_of_step(problem, context.state, load, solution, iterations, (index, instant), heat_solution)
+    rise_at_end = None if heat_solution is None else heat_solution.rise
+    end, result = _end_of_step(step, solution, instant, rise_at_end, iterations)
+    return end, result if heat_solution is None else heat_solution.with_heat_results(problem, result)
 
 
 def _end_of_step(
-    problem: Problem, start: State, load: StepLoad, solution: StepEquilibrium, iterations: dict[str, Any],
-    number_and_instant: tuple[int, float], heat_solution: HeatSolution | None,
-) -> tuple[State, StepResult]:  # fmt: skip
+    step: StepContext, solution: StepEquilibrium, instant: float, rise: Array | None, iterations: dict[str, Any]
+) -> tuple[State, StepResult]:
     """Return the state and the result at the end of a load step.
 
     Parameters
     ----------
-    problem : Problem
-    start : State
-        State in which the step began, see `prepare_start`.
-    load : StepLoad
+    step : StepContext
+        Data at the beginning of the step.
     solution : StepEquilibrium
         The converged equilibrium.
+    instant : float
+        Pseudo-time at the end of the step [-].
+    rise : ndarray (n_points,), optional
+        The converged temperature rise, in models with conduction of heat [temperature].
     iterations : dict
         Numbers of iterations, for `StepResult.iterations`; it is modified.
-    number_and_instant : (int, float)
-        Number of the step, and pseudo-time at its end.
-    heat_solution : HeatSolution, optional
-        The converged temperatures, in models with conduction of heat.
     """
+    problem, start, load = step.problem, step.state, step.load
     settled, u, balance = solution.settled, solution.u, solution.balance
+    obstacles = problem.obstacles_at(load, u)
     end = replace(
-        start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        instant=number_and_instant[1], rise=None if heat_solution is None else heat_solution.rise,
-    )  # fmt: skip
+        start, u=u, largest_force=balance.largest, obstacles=obstacles, angles=load.angles, instant=instant, rise=rise
+    )
     bodies = None
     if problem.bodies is not None and solution.terms is not None:
         bodies = solution.terms.bodies.at(u)
@@ -122,7 +116,7 @@ def _end_of_step(
             end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))
     contact: dict[str, ContactResult] = {}
     if settled is not None:
-        end, contact = _contact_at_end(problem, start, load, settled, end, balance.energy)
+        end, contact = _contact_at_end(step, settled, end, balance.energy)
     elif start.work is not None:
         end = replace(end, work=start.work.after(balance.energy, 0.0, (0.0, 0.0, 0.0)))
     if problem.extrapolates:
@@ -134,19 +128,17 @@ def _end_of_step(
         end = replace(end, extrapolation=extrapolation)
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
-    if problem.floating_bodies is not None and end.rigid is not None:
+    if problem.floating_bodies is not None and end.rigid is not None and settled is not None:
         # May be round-off relative to contact forces. Without loads it is zero, and contact forces are round-off.
         scale = end.largest_rigid_force
-        iterations["regularised"] = problem.floating_bodies.report(end.rigid, scale and max(scale, end.largest_force))
-        if settled is not None:
-            forces = settled.constraints, settled.solution.multiplier
-            free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force, balance.residual)
-            moving = (np.abs(free.displacement) > SINGLE_PRECISION).any(axis=1)
-            moved = {"undetermined": free.by_body(), "moved": largest((u - start.u)[moving])}
-            iterations["regularised"] |= moved
+        report = problem.floating_bodies.report(end.rigid, scale and max(scale, end.largest_force))
+        forces = settled.constraints, settled.solution.multiplier
+        free = problem.floating_bodies.undetermined(*forces, u, scale, balance.residual)
+        moving = (np.abs(free.displacement) > SINGLE_PRECISION).any(axis=1)
+        moved = {"undetermined": free.by_body(), "moved": largest((u - start.u)[moving])}
+        iterations["regularised"] = report | moved
     end = replace(end, solver=problem.solver.snapshot())
-    result = recover(problem, end, contact, balance.reaction, iterations, number_and_instant, bodies)
-    return end, result if heat_solution is None else heat_solution.with_heat_results(problem, result)
+    return end, recover(problem, end, step.index, contact, balance.reaction, iterations, bodies)
 
 
 def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> StepContext:
@@ -156,7 +148,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     If only forces act in the first step, no prescribed displacement provides a scale. The largest displacement of the
     solution without contact is then used, see `StepContext.expected`.
     """
-    load_as_force = load if load.rise is None else expansion_as_force(problem, load)
+    load_as_force = load if load.rise is None else thermal_coupling.expansion_as_force(problem, load)
     loaded = with_loads(problem, load_as_force)
     round_off, rigid_force, expected = state.gap_round_off, state.largest_rigid_force, 0.0
     zero = np.zeros(len(load.lift))
@@ -186,7 +178,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
 
 
 def _contact_at_end(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: tuple[float, float]
+    step: StepContext, settled: SettledContact, end: State, energy: tuple[float, float]
 ) -> tuple[State, dict[str, ContactResult]]:
     """Return the state `end` with the contact data that later steps need, and the results of each contact pair.
 
@@ -195,10 +187,8 @@ def _contact_at_end(
 
     Parameters
     ----------
-    problem : Problem
-    start : State
-        State at the beginning of the step.
-    load : StepLoad
+    step : StepContext
+        Data at the beginning of the step.
     settled : SettledContact
         Contact solution of the step.
     end : State
@@ -206,6 +196,7 @@ def _contact_at_end(
     energy : (float, float)
         Elastic strain energy and plastic work [energy].
     """
+    problem, start, load = step.problem, step.state, step.load
     displacement, solution = problem.displacement(end.u), settled.solution
     parts, rows_of_pairs = settled.constraints.parts, settled.constraints.rows
     configurations = {name: problem.configuration(name, start, load, displacement, end.u) for name in parts}
@@ -266,8 +257,8 @@ def _contact_at_end(
 
 
 def recover(
-    problem: Problem, end: State, contact: dict[str, ContactResult], reaction: Array, iterations: dict[str, Any],
-    number_and_instant: tuple[int, float], bodies: DeformedBodies | None = None,
+    problem: Problem, end: State, index: int, contact: dict[str, ContactResult], reaction: Array,
+    iterations: dict[str, Any], bodies: DeformedBodies | None = None,
 ) -> StepResult:  # fmt: skip
     """Return the result of a load step.
 
@@ -276,14 +267,14 @@ def recover(
     problem : Problem
     end : State
         State at the end of the step.
+    index : int
+        Number of the step.
     contact : dict of str to ContactResult
         Results of each contact pair.
     reaction : ndarray (n_dofs of the mesh,)
         Reactions [force].
     iterations : dict
         Numbers of iterations, see `StepResult`.
-    number_and_instant : (int, float)
-        Number of the step, and pseudo-time at its end.
     bodies : DeformedBodies, optional
         The nonlinear bodies at the end of the step; None if bodies are linear.
     """
@@ -316,7 +307,7 @@ def recover(
         stress, by_material = nodal_stress_of_materials(problem.sides, materials_of_cells, stress, mesh.n_points)
     equivalent, units = von_mises(stress), problem.model.units
     return StepResult(
-        *number_and_instant, u.copy(), stress, equivalent, von_mises_signed(stress, equivalent), reaction, contact,
+        index, end.instant, u.copy(), stress, equivalent, von_mises_signed(stress, equivalent), reaction, contact,
         iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
         temperature=heat, units=units and units_of_results(units, problem.model.kinematics),

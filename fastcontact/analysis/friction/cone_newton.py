@@ -241,14 +241,14 @@ def aligning_rotation(compliance: Array, directions: tuple[Array, ...] = ()) -> 
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
 
 
-def rotated(Q: csr_array | None, values: Array) -> Array:
-    """Return the product of Q ((1 + k) m, (1 + k) m) with values (1 + k, m) along normals and tangents; None is identity."""
-    return values if Q is None else np.asarray(Q @ values.ravel()).reshape(values.shape)
+def rotated(Q: csr_array | None, values: Array, back: bool = False) -> Array:
+    """Return the product of Q ((1 + k) m, (1 + k) m), or of its transpose, with values (1 + k, m) along normals and tangents.
 
-
-def rotated_back(Q: csr_array | None, values: Array) -> Array:
-    """Return the product of the transpose of Q with values (1 + k, m), see `rotated`."""
-    return rotated(None if Q is None else Q.T, values)
+    Without Q, the values are returned. The transpose, with `back`, is the inverse.
+    """
+    if Q is None:
+        return values
+    return np.asarray((Q.T if back else Q) @ values.ravel()).reshape(values.shape)
 
 
 def _angles_to_axes(tangent: Array, second_tangent: Array) -> Array:

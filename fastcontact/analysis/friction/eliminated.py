@@ -166,7 +166,7 @@ class Eliminated:
         Whether constraints are closed or stick, the residual and the number of iterations are those of `scaled`.
         """
         y = self.last_forces * self._unit
-        y, gaps = (cone_newton.rotated_back(self._rotation, values) for values in (y, self._gaps(self.u, y)))
+        y, gaps = (cone_newton.rotated(self._rotation, values, back=True) for values in (y, self._gaps(self.u, y)))
         return replace(scaled, y=y, gaps=gaps, iterations=1 + scaled.iterations)
 
     def _gaps(self, u: Array, forces: Array | float = 0.0) -> Array:

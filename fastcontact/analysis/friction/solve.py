@@ -13,19 +13,13 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import delassus, dense, eliminated
-from fastcontact.analysis.friction.cone_newton import (
-    SLIP_COMPLIANCE,
-    Law,
-    aligning_rotation,
-    held_tangents,
-    rotated,
-    rotated_back,
-)
+from fastcontact.analysis.friction.cone_newton import SLIP_COMPLIANCE, Law, aligning_rotation, held_tangents, rotated
 from fastcontact.analysis.friction.delassus import Delassus
 from fastcontact.analysis.friction.dense import numbers_at, scattered
 from fastcontact.analysis.solution import (
@@ -33,6 +27,7 @@ from fastcontact.analysis.solution import (
     FrictionSolution,
     LastIncrement,
     LoadPath,
+    Response,
     Solution,
     in_increments,
     response,
@@ -161,7 +156,7 @@ def _with_included(
         y0, closing = (rotated(problem.Q, values) for values in path.along(constraints.directions, rows))
         result, gaps_of_included, before = problem.in_increments(y0, closing, path.waiting[rows])
         last_increment = _last_increment(before, problem.Q, rows, constraints)
-    y, gaps_of_included = rotated_back(problem.Q, result.y), rotated_back(problem.Q, gaps_of_included)
+    y, gaps_of_included = (rotated(problem.Q, values, back=True) for values in (result.y, gaps_of_included))
     u = loaded.involved_solution(R.T @ y.ravel()[components], u)
     all_forces, (active, sticking) = np.zeros((1 + k, m)), np.zeros((2, m), bool)
     gaps = constraints.gaps_at_rest() + (all_rows @ u).reshape(1 + k, m)
@@ -170,7 +165,7 @@ def _with_included(
     return Solution(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
         sticking, result.residual, constraints.directions, last_increment=last_increment,
-        response=lambda: response(loaded, R, row_numbers, problem.force_response(result)),
+        response=partial(problem.response, loaded, R, row_numbers, result),
     )  # fmt: skip
 
 
@@ -229,13 +224,14 @@ class _IncludedProblem:
         y[:, at], closed[at], sticking[at] = result.y, result.closed, result.sticking
         return replace(result, y=y, gaps=gaps + self._gap_changes(y), closed=closed, sticking=sticking)
 
-    def force_response(self, result: FrictionSolution) -> dense.ForceResponse:
-        """Return the derivative of the forces with respect to gaps and slips at the solution `result`."""
+    def response(self, loaded: Loaded, R: csr_array, row_numbers: Indices, result: FrictionSolution) -> Response:
+        """Return the `Response` of the solution `result`; for R (n, n_unknowns) and `row_numbers` see `solution.response`."""
         # Constraints that are equations have no friction, and slips along held tangents do not vary.
         law = Law(np.where(self.equality, 0.0, self.mu), self.equality)
         at_end = replace(result, sticking=result.sticking & ~self.equality)
         Q = None if self.Q is None else csr_array(self.Q[self.components][:, self.components])
-        return dense.response(self.F, law, at_end, self.held_slips, Q, self.components)
+        force_response = dense.response(self.F, law, at_end, self.held_slips, Q, self.components)
+        return response(loaded, R, row_numbers, force_response)
 
 
 def _included_problem(
@@ -288,7 +284,7 @@ def _last_increment(
     """
     components, integrals, normal, begin = before
     no_gaps = np.zeros((1, len(rows)))
-    along_tangents = np.stack([rotated_back(Q, np.vstack([no_gaps, along]))[1:] for along in components])
+    along_tangents = np.stack([rotated(Q, np.vstack([no_gaps, along]), back=True)[1:] for along in components])
     m, dim = constraints.positions.shape
     vectors, all_integrals, all_normal = np.zeros((3, m, dim)), np.zeros((2, m)), np.zeros(m)
     vectors[:, rows] = np.einsum("pkm,kmd->pmd", along_tangents, np.stack(constraints.directions)[:, rows])
