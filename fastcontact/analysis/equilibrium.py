@@ -33,66 +33,21 @@ from fastcontact.linear.protocol import Loaded
 from fastcontact.linear.sparse_rows import sum_of_blocks
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
-# Elastic energy and plastic work of a term [energy].
+# Elastic energy and plastic work [energy].
 Energies = tuple[float, float]
 
 
 class Term(Protocol):
-    """Term of the equilibrium of a load step.
+    """Term of the equilibrium of a load step with nonlinear bodies, in addition to these bodies.
 
     In all methods u (n_dofs,) are the displacements of all points, and then of the force-driven obstacles [length].
     """
 
-    def residual(self, u: Array) -> tuple[Array, Energies]:
-        """Return the nodal forces (n_dofs,) of the term at u [force], and its energies."""
+    def residual(self, u: Array) -> tuple[Array, float]:
+        """Return the nodal forces (n_dofs,) of the term at u [force], and its elastic energy [energy]."""
 
-    def tangent(self, u: Array) -> bsr_array | csr_array:
-        """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length].
-
-        The caller may modify the matrix.
-        """
-
-
-class Bodies(Term):
-    """Nonlinear bodies in a load step that begins with the state `start`.
-
-    Forces and tangent are computed in one loop over the cells, and cached for the last two displacement vectors.
-    """
-
-    def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
-        self._problem, self._start, self._rise = problem, start, load.rise
-        self._cache: list[tuple[Array, DeformedBodies]] = []
-        self._tangent_passed_at: Array | None = None
-
-    def at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
-        """Return forces, energies, history variables and tangent of the bodies at u (n_dofs,) [length].
-
-        With ``tangent=False`` the tangent is only computed when it is needed.
-
-        Raises
-        ------
-        ConvergenceError
-            If a cell is inverted.
-        """
-        for cached_u, bodies in self._cache:
-            if cached_u is u:
-                return bodies
-        bodies = self._problem.deformed(u, self._start, self._rise, tangent=tangent)
-        self._cache = [*self._cache[-1:], (u, bodies)]
-        return bodies
-
-    def residual(self, u: Array) -> tuple[Array, Energies]:
-        """See `Term`."""
-        bodies, force = self.at(u, tangent=False), np.zeros_like(u)
-        force[: bodies.force.size] = bodies.force.ravel()
-        return force, (bodies.energy, bodies.plastic_work)
-
-    def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array:
-        """See `Term`; `geometric` selects how much of the geometric stiffness is included, see `NonlinearBodies.at`."""
-        if geometric < COMPLETE or u is self._tangent_passed_at:
-            return self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
-        self._tangent_passed_at = u
-        return self.at(u).K
+    def tangent(self, u: Array) -> csr_array:
+        """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length]."""
 
 
 class SpringForces(Term):
@@ -102,11 +57,11 @@ class SpringForces(Term):
         self._springs, self._n = springs, n
         self._K = spring_stiffness(springs, n)
 
-    def residual(self, u: Array) -> tuple[Array, Energies]:
+    def residual(self, u: Array) -> tuple[Array, float]:
         """See `Term`."""
         force, mesh_displacement = np.zeros_like(u), u[: self._n]
         force[: self._n] = spring_force(self._springs, mesh_displacement)
-        return force, (0.5 * float(force[: self._n] @ mesh_displacement), 0.0)
+        return force, 0.5 * float(force[: self._n] @ mesh_displacement)
 
     def tangent(self, u: Array) -> csr_array:
         """See `Term`."""
@@ -139,11 +94,11 @@ class FollowingForce(Term):
         self._displacement, self._force, self._stiffness, self._factor = problem.displacement, force, stiffness, factor
         self._included = force(problem.displacement(at))
 
-    def residual(self, u: Array) -> tuple[Array, Energies]:
+    def residual(self, u: Array) -> tuple[Array, float]:
         """See `Term`."""
         force, current = np.zeros_like(u), self._force(self._displacement(u))
         force[: current.size] = -self._factor * (current - self._included).ravel()
-        return force, (0.0, 0.0)
+        return force, 0.0
 
     def tangent(self, u: Array) -> csr_array:
         """See `Term`."""
@@ -151,7 +106,7 @@ class FollowingForce(Term):
 
 
 class Terms:
-    """The sum of the terms of a load step with nonlinear bodies.
+    """The nonlinear bodies and the other terms of a load step.
 
     Parameters
     ----------
@@ -159,33 +114,56 @@ class Terms:
     start : State
         State at the beginning of the step.
     load : StepLoad
-
-    Attributes
-    ----------
-    bodies : Bodies
-        The term of the nonlinear bodies.
     """
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
-        self.bodies = Bodies(problem, start, load)
+        self._problem, self._start, self._rise = problem, start, load.rise
+        self._last_bodies: list[tuple[Array, DeformedBodies]] = []  # at the last two displacement vectors
+        self._tangent_passed_at: Array | None = None  # where the caller may have modified the tangent
         springs, n = problem.model.springs, problem.model.n_dofs
-        self._terms: list[Term] = [SpringForces(springs, n)] if springs else []
+        self._others: list[Term] = [SpringForces(springs, n)] if springs else []
         for (pressure, _), factor in zip(problem.following, load.following, strict=True):
             force, tangent = (lambda u, index=index, at=pressure.at: at(u)[index] for index in (0, 1))
-            self._terms.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
+            self._others.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
+
+    def bodies_at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
+        """Return forces, energies, history variables and tangent of the bodies at u (n_dofs,) [length].
+
+        They are computed in one loop over the cells. With ``tangent=False`` the tangent is only computed when it is needed.
+
+        Raises
+        ------
+        ConvergenceError
+            If a cell is inverted.
+        """
+        for last_u, bodies in self._last_bodies:
+            if last_u is u:
+                return bodies
+        bodies = self._problem.deformed(u, self._start, self._rise, tangent=tangent)
+        self._last_bodies = [*self._last_bodies[-1:], (u, bodies)]
+        return bodies
 
     def residual(self, u: Array, others: Sequence[Term] = ()) -> tuple[Array, Energies]:
-        """Return the sums of the nodal forces and of the energies of all terms, including the terms `others`; see `Term`."""
-        force, energy = self.bodies.residual(u)
-        for term in (*self._terms, *others):
-            added, stored = term.residual(u)
-            force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
-        return force, energy
+        """Return the nodal forces (n_dofs,) at u (n_dofs,) [force] and the energies of bodies, all terms, and `others`."""
+        bodies, force = self.bodies_at(u, tangent=False), np.zeros_like(u)
+        force[: bodies.force.size] = bodies.force.ravel()
+        strain_energy = bodies.energy
+        for term in (*self._others, *others):
+            added_force, added_energy = term.residual(u)
+            force, strain_energy = force + added_force, strain_energy + added_energy
+        return force, (strain_energy, bodies.plastic_work)
 
     def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array:
-        """Return the sum of the tangents, see `Term`, of nonlinear bodies and all other terms."""
-        K = self.bodies.tangent(u, geometric)
-        for term in self._terms:
+        """Return the sum of the tangents of bodies and all terms [force / length].
+
+        `geometric` selects how much of the geometric stiffness is included, see `NonlinearBodies.at`. The caller may modify
+        the matrix.
+        """
+        if geometric < COMPLETE or u is self._tangent_passed_at:
+            K = self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
+        else:
+            K, self._tangent_passed_at = self.bodies_at(u).K, u
+        for term in self._others:
             K = sum_of_blocks(K, term.tangent(u))
         return K
 
@@ -218,7 +196,7 @@ class Balance:
     bound: float
     relative: float
     noise: float = 0.0
-    energy: tuple[float, float] = (0.0, 0.0)
+    energy: Energies = (0.0, 0.0)
 
     @property
     def excess(self) -> float:
@@ -253,7 +231,7 @@ class Balance:
 
 def balance(
     problem: Problem, u: Array, contact_force: Array, external: Array, largest_so_far: float,
-    internal: tuple[Array, tuple[float, float]],
+    internal: tuple[Array, Energies],
 ) -> Balance:  # fmt: skip
     """Return the reactions at supports, and the residual at all other degrees of freedom.
 

@@ -206,112 +206,97 @@ def solve_inequalities(
     displacement : ndarray (k,)
         Displacement components of `Problem.dofs` [length].
     """
-    if step.problem.floating_bodies is not None:
-        return _with_floating_bodies(step, step.problem.floating_bodies, constraints, iterate, active, accuracy)
-    solution = _solve(step, constraints, iterate, active, accuracy, step.load.lift, iterate.u)
+    pairing = step, constraints, iterate, active, accuracy
+    if (bodies := step.problem.floating_bodies) is not None:
+        return _FloatingContact(*pairing, bodies, iterate.u).settled()
+    solution = _PairingProblem(*pairing).solution(step.load.lift, iterate.u)
     return solution, step.problem.dofs.displacement(solution.u, step.load.lift)
 
 
-def _solve(
-    step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array, guess: Array
-) -> Solution:  # fmt: skip
-    """Return the contact solution in the unknowns that remain after supports and multi-point constraints are eliminated.
+@dataclass(eq=False)
+class _PairingProblem:
+    """Contact problem of one pairing, see `solve_inequalities`."""
 
-    `lift` (n_dofs,) are the displacements that supports and multi-point constraints prescribe if all unknowns are zero, and
-    `guess` (n_dofs,) are initial displacements [length].
-    """
-    condensed = step.problem.dofs.constraints(constraints, lift, step.state.u)
-    u = step.problem.dofs.unknowns(guess, lift)
-    if not constraints.tangents:
-        return active_set.solve(step.loaded, condensed, active, accuracy, u)
-    from fastcontact.analysis.friction import solve as friction
+    step: StepContext
+    constraints: Constraints
+    iterate: Iterate
+    active: Mask
+    accuracy: Accuracy
 
-    condensed = replace(condensed, driven=step.driven(constraints))
-    if isinstance(step.path, LastIncrement) and len(step.path.slip) == len(constraints):
-        condensed = step.path.since_its_beginning(condensed)
-        solution = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional)
-        iterate.frictional = step.path.over_whole_step(solution)
-    else:
-        path = step.path if isinstance(step.path, LoadPath) else None
-        iterate.frictional = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional, path)
-    return iterate.frictional
+    def solution(self, lift: Array, guess: Array) -> Solution:
+        """Return the solution in the unknowns that remain after supports and multi-point constraints are eliminated.
 
+        `lift` (n_dofs,) are the displacements that supports and multi-point constraints prescribe if all unknowns are zero,
+        and `guess` (n_dofs,) are initial displacements [length].
+        """
+        step, iterate, dofs = self.step, self.iterate, self.step.problem.dofs
+        condensed, u = dofs.constraints(self.constraints, lift, step.state.u), dofs.unknowns(guess, lift)
+        if not condensed.tangents:
+            return active_set.solve(step.loaded, condensed, self.active, self.accuracy, u)
+        from fastcontact.analysis.friction import solve as friction
 
-def _with_floating_bodies(
-    step: StepContext, bodies: FloatingBodies, constraints: Constraints, iterate: Iterate, active: Mask,
-    accuracy: Accuracy,
-) -> tuple[Solution, Array]:  # fmt: skip
-    """Return the result of `solve_inequalities` if contact alone restrains some bodies.
-
-    Springs that are anchored at a rigid position of these bodies hold them. `FloatingBodies.settle` iterates the position
-    until the springs carry no force.
-    """
-    problem, state, dofs = step.problem, step.state, step.problem.dofs
-    contact = _FloatingContact(step, bodies, constraints, iterate, accuracy, active, iterate.u)
-    start = iterate.u[bodies.dofs] if iterate.history else contact.first_position()
-    relative_accuracy, round_off = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0), state.gap_round_off
-    # The response requires many linear solutions, which are cheap only if the matrix is factorised.
-    position_response = None if problem.solver.iterative else partial(bodies.position_response, constraints, dofs)
-    if position_response is not None:
-        # Displacements without contact forces, which are large if bodies are flexible, cancel.
-        round_off = max(round_off, SUM_ROUND_OFF * largest(step.loaded.full_solution(np.zeros(dofs.T.shape[1]))))
-    in_increments, on_soft_springs = isinstance(step.path, LoadPath), None
-    if constraints.tangents and (position_response is not None or in_increments):
-        # With stiff springs, a problem with friction may have several solutions, and none near the position of equilibrium.
-        slides, last_frictional = in_increments or not iterate.history, iterate.frictional
-        soft_springs = bodies.with_soft_springs(step.loaded, dofs, contact.loads[0], slides)
-        on_soft_springs = contact.solve_at(start, soft_springs)
-        if on_soft_springs.settled:
-            start = start + on_soft_springs.u[dofs.springs]
-        elif in_increments:
-            return on_soft_springs, contact.guess[dofs.active]
+        condensed, path = replace(condensed, driven=step.driven(self.constraints)), step.path
+        if isinstance(path, LastIncrement) and len(path.slip) == len(condensed):
+            arguments = step.loaded, path.since_its_beginning(condensed), self.active, self.accuracy, u
+            iterate.frictional = path.over_whole_step(friction.solve(*arguments, iterate.frictional))
         else:
-            iterate.frictional = last_frictional
-        if in_increments:  # stiff springs are slack only at the end of the step
-            contact.step = replace(step, path=on_soft_springs.last_increment)
-    rigid = bodies.settle(
-        contact.solve_at,
-        position_response,
-        dofs.springs,
-        start,
-        state.largest_rigid_force,
-        relative_accuracy,
-        round_off,
-    )
-    if rigid.solution.settled and not rigid.slack:
-        gaps, has_friction = gap_changes(problem.model, bodies.motions), bool(constraints.friction.any())
-        raise contact.failure(not_restrained(bodies, rigid, state.largest_rigid_force, has_friction, gaps))
-    iterate.rigid, solution = rigid, rigid.solution
-    if on_soft_springs is not None:
-        iterations = solution.iterations + on_soft_springs.iterations
-        solution = replace(solution, iterations=iterations, last_increment=on_soft_springs.last_increment)
-    respond = solution.response
-    if position_response is not None and respond is not None:
-        solution = replace(solution, response=lambda: position_response(respond()).respond)
-    return solution, contact.guess[dofs.active]
+            arguments = step.loaded, condensed, self.active, self.accuracy, u
+            path = path if isinstance(path, LoadPath) else None
+            iterate.frictional = friction.solve(*arguments, iterate.frictional, path)
+        return iterate.frictional
 
 
 @dataclass(eq=False)
-class _FloatingContact:
-    """Contact problem of one pairing with bodies on springs, and the guess for its next solution.
+class _FloatingContact(_PairingProblem):
+    """Contact problem of one pairing if contact alone restrains some bodies, which springs hold.
+
+    The springs are anchored at a rigid position of these bodies. `FloatingBodies.settle` iterates the position until the
+    springs carry no force.
 
     Attributes
     ----------
-    step, bodies, constraints, iterate, accuracy
-        See `_with_floating_bodies`.
+    bodies : FloatingBodies
     active : ndarray of bool (m,)
         Initial active set of the next solution.
     guess : ndarray (n_dofs,)
         Displacements of the last solution, the initial guess of the next one [length].
     """
 
-    step: StepContext
     bodies: FloatingBodies
-    constraints: Constraints
-    iterate: Iterate
-    accuracy: Accuracy
-    active: Mask
     guess: Array
+
+    def settled(self) -> tuple[Solution, Array]:
+        """Return the result of `solve_inequalities`."""
+        step, bodies, constraints, iterate = self.step, self.bodies, self.constraints, self.iterate
+        problem, dofs, largest_load = step.problem, step.problem.dofs, step.state.largest_rigid_force
+        start = iterate.u[bodies.dofs] if iterate.history else self.first_position()
+        relative_accuracy = 10 * max(problem.solver.tolerance, self.accuracy.residual or 0.0)
+        position_response, round_off = None, step.state.gap_round_off
+        if not problem.solver.iterative:  # the response requires many solutions, which are cheap if K is factorised
+            position_response = partial(bodies.position_response, constraints, dofs)
+            # Displacements without contact forces, which are large if bodies are flexible, cancel.
+            round_off = max(round_off, SUM_ROUND_OFF * largest(step.loaded.full_solution(np.zeros(dofs.T.shape[1]))))
+        in_increments, on_soft_springs = isinstance(step.path, LoadPath), None
+        if constraints.tangents and (position_response is not None or in_increments):
+            on_soft_springs = self.solve_on_soft_springs(start, in_increments)
+            if on_soft_springs.settled:
+                start = start + on_soft_springs.u[dofs.springs]
+            elif in_increments:
+                return on_soft_springs, self.guess[dofs.active]
+            if in_increments:  # stiff springs are slack only at the end of the step
+                self.step = replace(step, path=on_soft_springs.last_increment)
+        accuracy = largest_load, relative_accuracy, round_off
+        rigid = bodies.settle(self.solve_at, position_response, dofs.springs, start, *accuracy)
+        if rigid.solution.settled and not rigid.slack:
+            gaps, has_friction = gap_changes(problem.model, bodies.motions), bool(constraints.friction.any())
+            raise self.failure(not_restrained(bodies, rigid, largest_load, has_friction, gaps))
+        iterate.rigid, solution = rigid, rigid.solution
+        if on_soft_springs is not None:
+            iterations = solution.iterations + on_soft_springs.iterations
+            solution = replace(solution, iterations=iterations, last_increment=on_soft_springs.last_increment)
+        if position_response is not None and (respond := solution.response) is not None:
+            solution = replace(solution, response=lambda: position_response(respond()).respond)
+        return solution, self.guess[dofs.active]
 
     @cached_property
     def loads(self) -> tuple[Array, float]:
@@ -327,10 +312,24 @@ class _FloatingContact:
     def solve_at(self, anchor: Array, loaded: Loaded | None = None) -> Solution:
         """Return the solution with springs anchored at a rigid position (k,) [length]; `loaded` may contain other springs."""
         lift, dofs = self.step.load.lift + self.bodies.rigid(anchor), self.step.problem.dofs
-        step = self.step if loaded is None else replace(self.step, loaded=loaded)
-        solution = _solve(step, self.constraints, self.iterate, self.active, self.accuracy, lift, self.guess)
+        problem = self if loaded is None else replace(self, step=replace(self.step, loaded=loaded))
+        solution = problem.solution(lift, self.guess)
         self.active, self.guess = solution.wanted, self.guess.copy()
         self.guess[dofs.active] = dofs.displacement(solution.u, lift)
+        return solution
+
+    def solve_on_soft_springs(self, anchor: Array, in_increments: bool) -> Solution:
+        """Return the solution with soft springs that are anchored at a rigid position (k,) [length].
+
+        With stiff springs, a problem with friction may have several solutions, none of them near the position of equilibrium.
+        If the iteration does not converge, its forces are no initial guess, except in increments.
+        """
+        step, iterate, last_frictional = self.step, self.iterate, self.iterate.frictional
+        slides = in_increments or not iterate.history
+        loaded = self.bodies.with_soft_springs(step.loaded, step.problem.dofs, self.loads[0], slides)
+        solution = self.solve_at(anchor, loaded)
+        if not (solution.settled or in_increments):
+            iterate.frictional = last_frictional
         return solution
 
     def first_position(self) -> Array:

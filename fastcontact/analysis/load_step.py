@@ -107,7 +107,7 @@ def _end_of_step(
     )
     bodies = None
     if problem.bodies is not None and solution.terms is not None:
-        bodies = solution.terms.bodies.at(u)
+        bodies = solution.terms.bodies_at(u)
         end = replace(end, history=bodies.history)
         # In the first step, which begins without a history, the path is unknown.
         if problem.bodies.halving_estimates_error and load.rise is None and start.history:

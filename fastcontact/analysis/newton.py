@@ -123,6 +123,7 @@ class _Newton:
     def __init__(self, begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> None:
         self._problem, self._begin, self._start, self._load = begin.problem, begin, begin.state, load
         self._terms = Terms(begin.problem, begin.state, load)
+        self._tolerance = max(begin.problem.criteria.geometry, TOLERANCE)  # of the relative error of the displacements
         settled = None if before is None else before.settled
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
@@ -178,11 +179,6 @@ class _Newton:
         """Return the largest `change` [length] of displacements relative to the largest one; u (n_dofs,) are the new ones."""
         size = max(map(largest, (u, self._load.lift, self._start.u)))
         return change / size if size else 0.0
-
-    @property
-    def _tolerance(self) -> float:
-        """Relative error of the displacement at which iterations end."""
-        return max(self._problem.criteria.geometry, TOLERANCE)
 
     def _has_converged(self, changes: list[float]) -> bool:
         """Return whether relative `changes` after an accurate linear solution leave an error below the criterion.
@@ -373,13 +369,13 @@ class _Newton:
 
         The step is halved until no cells are inverted. After a full step, `changes` decide whether another tangent is needed.
         """
-        fraction, bodies = 1.0, self._terms.bodies
+        fraction = 1.0
         changes = [*changes, self._relative(largest(target - u), target)]
         last = self._has_converged(changes) or (self._reusable is not None and self._tangent_suffices(changes))
         for _ in range(HALVINGS):
             trial = target if fraction == 1.0 else u + fraction * (target - u)
             try:
-                bodies.at(trial, tangent=not last)
+                self._terms.bodies_at(trial, tangent=not last)
             except ConvergenceError as error:
                 failure = error
             else:

@@ -348,9 +348,11 @@ def prepare(
     motions = _floating_motions(model, supported)
     bodies = FloatingBodies(motions, system, solver.iterative, model.springs) if len(motions) else None
     dofs = _prepared_dofs(model, solver, system, bodies, contact_dofs)
+    thermal = {} if model.nonlinear else model.thermal_forces_by_ramp()
+    forces = sums_by_ramp([*model.forces_by_ramp().items(), *thermal.items(), *model.initial_forces_by_ramp().items()])
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies, dofs, contact_dofs, driven,
-        driven.prescribed(prescribed), driven.forces(_forces(model)), solver.snapshot(), tuple(warnings),
+        driven.prescribed(prescribed), driven.forces(forces), solver.snapshot(), tuple(warnings),
         model.nonlinear_bodies(field), model.following_pressures() if model.strain == "finite" else [],
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
@@ -406,15 +408,6 @@ def _floating_motions(model: Model, supported: Mask, displacement: Array | float
     deformed = model.mesh.replace(points=model.mesh.points + displacement)
     motions = free_motions(deformed, model.kinematics, supported, model.constraint_rows())
     return model.force_driven.motions(motions)
-
-
-def _forces(model: Model) -> dict[Table | None, Array]:
-    """Return the nodal forces (n_points, dim) at multiplier 1 for each ramp [force].
-
-    They include loads, initial states and, for linear bodies, thermal expansion.
-    """
-    thermal = {} if model.nonlinear else model.thermal_forces_by_ramp()
-    return sums_by_ramp([*model.forces_by_ramp().items(), *thermal.items(), *model.initial_forces_by_ramp().items()])
 
 
 def _prepared_dofs(
