@@ -116,8 +116,7 @@ def _settle(
 ) -> SettledContact:
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
     problem, criteria = step.problem, step.problem.criteria
-    limit = 0 if criteria.keep_pairing else criteria.geometry_updates
-    limit = criteria.max_geometry_updates if limit is None else limit
+    limit = criteria.max_geometry_updates if problem.until_settled else criteria.geometry_updates or 0
     # From a converged iterate, the loop continues without extrapolation and with accurate solutions.
     extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
     residual = problem.solver.tolerance
@@ -178,8 +177,8 @@ def _settle(
             return replace(settled, scatter=scatter)
         iterate.u[problem.dofs.active] = mixing.next(settled, before, displacement, tolerance, tolerances.inexact)
         tolerances.tighten(relative_change, solution.residual)
-        late = update >= max(limit // 2, UPDATES_BEFORE_ROUNDING) and not iterate.rounded
-        if late and any(pair.may_alternate(constraints.parts[name]) for name, pair in problem.pairs.items()):
+        is_slow = update >= max(limit // 2, UPDATES_BEFORE_ROUNDING) and not iterate.rounded
+        if is_slow and any(pair.may_alternate(constraints.parts[name]) for name, pair in problem.pairs.items()):
             log.info("pairings alternate: edges of facets are now rounded, and small overlaps carry no constraint")
             iterate.rounded = True
             mixing.accelerated, window = None, ScatterWindow()
@@ -212,7 +211,7 @@ def _store_solution(
 
 
 class _Mixing:
-    """Choice of the next iterate: by Newton's method while it converges, and by Anderson acceleration otherwise.
+    """Computation of the next iterate: by Newton's method while it converges, otherwise by Anderson acceleration.
 
     Anderson acceleration uses only iterates with the same active set, between which the geometry varies smoothly, unless
     active sets alternate, because each of them then results from the geometry of the other.
@@ -226,15 +225,15 @@ class _Mixing:
     accelerated : Anderson, optional
         Anderson acceleration with the earlier iterates that it uses; None to discard them.
     contraction : float
-        Factor by which a solution contracts changes of the geometry, from the last Newton step; infinite if unknown.
+        Factor by which a solution contracts changes of the geometry, from the last Newton step; infinite if unknown [-].
     """
 
     def __init__(self, step: StepContext) -> None:
         self._step, self.accelerated = step, None
         self._last_state, self._earlier_states, self._cycles = b"", set[bytes](), False
-        # Start of the last Newton step with cohesive layers, the step, the slope at its start, the fraction that is taken.
+        # With cohesive layers: start of the last Newton step, the step, the slope at its start, and the fraction taken.
         self._line: tuple[Array, Array, float, float] | None = None
-        self._newton, self._change, self.contraction = step.linearises_contact, np.inf, np.inf
+        self._uses_newton, self._last_change, self.contraction = step.linearises_contact, np.inf, np.inf
 
     accelerated: Anderson | None
 
@@ -256,12 +255,12 @@ class _Mixing:
         # While this state is constant, the solution depends smoothly on the geometry.
         state = solution.active.tobytes() + (b"" if branches is None else branches.tobytes())
         same_state = self._last_state == state
-        declines = self._newton and change <= self._change
-        self._newton = declines or (branches is not None and (same_state or self._line is not None))
-        if branches is not None and change > SAFETY * self.contraction * self._change:
+        converges = self._uses_newton and change <= self._last_change
+        self._uses_newton = converges or (branches is not None and (same_state or self._line is not None))
+        if branches is not None and change > SAFETY * self.contraction * self._last_change:
             self.contraction = np.inf  # it was determined with other branches
-        self._line, self._change = None, change
-        if self._newton and solution.settled and SAFETY * self.contraction * change > tolerance:
+        self._line, self._last_change = None, change
+        if self._uses_newton and solution.settled and SAFETY * self.contraction * change > tolerance:
             newton_result = newton_step(self._step, settled, before, displacement, tolerance / change)
             if newton_result is not None:
                 next_pairing, self.contraction = newton_result
@@ -273,7 +272,7 @@ class _Mixing:
                     return next_pairing
                 self.accelerated = None  # the step would increase the energy, which the solution decreases
                 return displacement
-        self._cycles |= not (same_state or self._newton) and state in self._earlier_states
+        self._cycles |= not (same_state or self._uses_newton) and state in self._earlier_states
         self._last_state = state if solution.settled else b""
         self._earlier_states.add(self._last_state)
         if inexact or not (same_state or self._cycles or settled.iterate.rounded):
@@ -306,7 +305,9 @@ class _Mixing:
 def newton_step(
     step: StepContext, settled: SettledContact, before: Array, image: Array, accuracy: float
 ) -> tuple[Array, float] | None:
-    """Return the active displacements (k,) of the next pairing [length], and the norm of S'; None without derivatives.
+    """Return the active displacements (k,) of the next pairing [length] and an estimate of the norm of S' [-].
+
+    The result is None if the solution has no derivatives, or if the step is unreliable.
 
     Parameters
     ----------
@@ -314,8 +315,8 @@ def newton_step(
     settled : SettledContact
         The last pairing and its solution, where representatives replace the constraints of shared nodes.
     before, image : ndarray (k,)
-        Active displacements of the pairing and of the solution [length]. Displacements that solutions do not determine are
-        taken from `image`.
+        Active displacements of the pairing and of the solution [length]. The next displacements that contact solutions do not
+        determine are those of `image`.
     accuracy : float
         Sufficient relative accuracy of the change [-].
     """
@@ -325,40 +326,40 @@ def newton_step(
     displacement = step.problem.displacement(u)
     if nodes is not None:
         solution = nodes.with_distributed_forces(solution, constraints, u)
-    if solution.response is None or not (parts := _linearised(constraints, solution, displacement)):
+    if solution.response is None or not (geometries := _linearised(constraints, solution, displacement)):
         return None
     try:
         respond = solution.response()
     except LinAlgError:
         return None
-    where, gaps = dofs.compared, np.zeros((1 + len(constraints.tangents), len(constraints)))
+    compared, gaps = dofs.compared, np.zeros((1 + len(constraints.tangents), len(constraints)))
 
     def response_along(v: Array) -> Array:
-        """Return the active components (k,) of ``S'(u) v`` for the components v on which contact depends."""
+        """Return the active components (k,) of ``S'(u) v`` for changes v of the components on which contact depends."""
         u, force = np.zeros((2, len(step.load.lift)))
         u[step.problem.contact_dofs] = v
         nodal = step.problem.displacement(u)
-        for rows, part in parts:
-            forces, slips = part.derivatives_along(nodal)
+        for rows, geometry in geometries:
+            forces, slips = geometry.derivatives_along(nodal)
             gaps[: len(slips), rows] = slips
             force[: forces.size] += forces.ravel()
         merged = gaps if nodes is None else nodes.merged_gaps(gaps)
         return np.asarray(dofs.T @ respond(dofs.transpose @ force[dofs.active], merged))
 
-    changed = (image - before)[where]
-    largest_change = largest(changed) or 1.0
+    changes = (image - before)[compared]
+    largest_change = largest(changes) or 1.0
     # With the tolerance `accuracy` itself, load steps of plastic bodies take 10 % more pairings.
-    system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - response_along(v)[where], dtype=float)
-    v, _ = gmres(system, changed / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
-    response_size = largest(largest_change * v - changed)
+    system = LinearOperator((len(changes),) * 2, matvec=lambda v: v - response_along(v)[compared], dtype=float)
+    v, _ = gmres(system, changes / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
+    response_size = largest(largest_change * v - changes)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable, except where layers soften.
     if not response_size <= (largest_change if constraints.branches is None else np.inf):
         return None
     next_pairing, determined = image.copy(), dofs.determined
-    if len(determined) > len(where):  # there are springs of floating bodies
+    if len(determined) > len(compared):  # there are springs of floating bodies
         next_pairing[determined] += largest_change * response_along(v)[determined]
     else:
-        next_pairing[where] = before[where] + largest_change * v
+        next_pairing[compared] = before[compared] + largest_change * v
     return next_pairing, response_size / (largest_change * largest(v) or 1.0)
 
 

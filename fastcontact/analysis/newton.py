@@ -45,9 +45,9 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
     begin : StepContext
         Data at the beginning of the step, with the linear solver prepared for zero displacements.
     load : StepLoad
-        Load of `begin`, or the same with other temperatures.
+        Load of `begin`, or the same load with other temperatures.
     before : StepEquilibrium, optional
-        Equilibrium of the same step under nearly the same load.
+        Equilibrium of the same step under nearly the same load, from which the iterations start.
 
     Raises
     ------
@@ -70,13 +70,13 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
 def _linear_equilibrium(begin: StepContext, load: StepLoad, before: StepEquilibrium | None) -> StepEquilibrium:
     """Return the result of `newton` for linear bodies, whose tangents are constant.
 
-    As long as forces do not balance, the contact problem is solved again, with more accurate linear solutions.
+    Until the forces balance, the contact problem is solved again with more accurate linear solutions.
     """
     problem, start, u, settled = begin.problem, begin.state, begin.state.u, None
     iterate = Iterate.of(start) if before is None or before.settled is None else before.settled.iterate
     while True:
-        unchanged = load is begin.load and settled is None
-        step = begin if unchanged else replace(begin, load=load, loaded=equilibrium.with_loads(problem, load))
+        is_prepared = load is begin.load and settled is None
+        step = begin if is_prepared else replace(begin, load=load, loaded=equilibrium.with_loads(problem, load))
         settled = settle_geometry(step, iterate)
         u, contact_force = equilibrium.solve_displacements(step, settled, u)
         force = problem.system.K @ u
@@ -101,7 +101,7 @@ class Regularisation:
     gap_stiffness : float
         Stiffness of springs along closed gaps, over the largest stiffness of the bodies [-].
     stiff : bool
-        Whether the springs of floating bodies are as stiff as the bodies.
+        Whether the springs of floating bodies are as stiff as these bodies.
     replaces_springs : bool
         Whether the springs along closed gaps replace those of floating bodies, provided that they resist all free motions.
     """
@@ -113,7 +113,7 @@ class Regularisation:
 
     @property
     def linear(self) -> bool:
-        """Whether iterations with this tangent converge linearly only."""
+        """Whether iterations with this tangent converge only linearly."""
         return self.geometric < COMPLETE or self.gap_stiffness > 0.0
 
 
@@ -130,7 +130,7 @@ class _Newton:
         self._reusable: Problem | None = None  # problem with the last tangent, if another iteration may use it
         self._reused = False  # whether the last iteration used the tangent of an earlier one
         self._linear_tolerance: float | None = None  # of the last linear solution, if larger than that of the solver
-        self._moved_fully = False  # whether displacements are those of the last contact solution
+        self._has_full_step = False  # whether displacements are those of the last contact solution
         self._regularisation = Regularisation()  # of the last tangent
         self._replaces_springs = bool(begin.problem.force_driven.pairs)  # see `Regularisation`
         self._mixing = Anderson(DEPTH, np.arange(len(begin.state.u)))
@@ -165,7 +165,7 @@ class _Newton:
             small = self._has_converged(changes) or change <= self._start.gap_round_off
             if fraction == 1.0 and force_balance.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, force_balance, self._terms, history)
-            self._moved_fully = fraction == 1.0 and not self._regularisation.linear
+            self._has_full_step = fraction == 1.0 and not self._regularisation.linear
             u = self._accelerated(before, u, changes) if fraction == 1.0 else u
             if len(changes) > WINDOW and min(changes[-WINDOW:]) > DECLINE * min(changes[:-WINDOW]):
                 break
@@ -176,7 +176,7 @@ class _Newton:
         )
 
     def _relative(self, change: float, u: Array) -> float:
-        """Return the largest `change` [length] of displacements relative to the largest one; u (n_dofs,) are the new ones."""
+        """Return the ratio of the largest change of the displacements [length] to the largest displacement in u (n_dofs,)."""
         size = max(map(largest, (u, self._load.lift, self._start.u)))
         return change / size if size else 0.0
 
@@ -197,7 +197,7 @@ class _Newton:
         """Return the rate of convergence [-], the ratio of the last two `changes`.
 
         With the tangent of an earlier iteration, this ratio ignores points whose plastic flow has begun or ended since. The
-        ratio before is then used as well.
+        larger of this ratio and the preceding one is then returned.
         """
         before, last = changes[-2:]
         rate = last / before if before else 1.0
@@ -208,23 +208,26 @@ class _Newton:
     def _accelerated(self, before: Array, u: Array, changes: list[float]) -> Array:
         """Return the next iterate (n_dofs,) [length], after an iteration from `before` (n_dofs,) to u (n_dofs,).
 
-        Anderson acceleration is used where a regularised tangent makes the iterations converge linearly. The springs of
-        floating bodies also do so if the load turns a body, like a roller without friction: its rotations change by a
-        constant factor, which exceeds 1 if it is not stable.
+        Anderson acceleration is used where a regularised tangent makes the iterations converge linearly. So do the springs
+        of floating bodies if the load turns a body, like a roller without friction: its rotations change by a constant
+        factor, which exceeds 1 if its equilibrium is unstable.
         """
-        floats = self._problem.floating_bodies is not None and len(changes) > 2 and changes[-1] <= NOTABLE
-        drifts = floats and changes[-1] > DECLINE * changes[-2] > DECLINE**2 * changes[-3]
-        if not (self._regularisation.linear or drifts) or DECLINE * changes[-1] > changes[-2]:
+        linear = self._regularisation.linear
+        if self._problem.floating_bodies is not None and len(changes) > 2 and changes[-1] <= NOTABLE:
+            linear |= changes[-1] > DECLINE * changes[-2] > DECLINE**2 * changes[-3]
+        if not linear or DECLINE * changes[-1] > changes[-2]:
             self._mixing.restart()
             return u
         return self._mixing.mixed(before, u)
 
     def _tangent_suffices(self, changes: list[float]) -> bool:
-        """Return whether a further iteration with the last tangent is expected to be the last iteration.
+        """Return whether one further iteration with the last tangent, if it is reusable, is expected to be the last one.
 
         The next change of Newton's method is C times the square of the last one. The error after a second iteration with
-        the same tangent is C^2 times the cube of the last change. Further ones reduce it at a constant rate.
+        the same tangent is C^2 times the cube of the last change. Further iterations reduce it at a constant rate.
         """
+        if self._reusable is None:
+            return False
         if self._reused:
             return self._rate(changes) ** 2 * changes[-1] <= self._tolerance
         before, last = changes[-2:] if len(changes) > 2 else (0.0, changes[-1])
@@ -232,19 +235,19 @@ class _Newton:
         return len(changes) > 1 and C**2 * last**3 <= self._tolerance
 
     def _force_balance(self, u: Array, contact_force: Array, linearised_at: Array) -> Balance:
-        """Return the force balance at displacements u with contact forces linearised at `linearised_at` (n_dofs,)."""
+        """Return the force balance at u (n_dofs,) under the contact forces of a problem linearised at `linearised_at`."""
         internal = self._terms.residual(u, self._fluid(linearised_at))
         return balance(self._problem, u, contact_force, self._load.force, self._start.largest_force, internal)
 
     def _solve(self, u: Array, changes: list[float]) -> tuple[Array, Array]:
         """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of terms linearised at u (n_dofs,).
 
-        The contact geometry converges to a fraction of the last relative change of the displacement in `changes`. If the
+        The contact geometry is iterated to a fraction of the last relative change of the displacements in `changes`. If the
         tangent is not positive definite, the springs of floating bodies are stiffened. If this does not suffice, springs are
         added along closed gaps, with which convergence remains quadratic except for motions that contact does not restrain.
         Finally, parts of the geometric stiffness are omitted. Once springs have sufficed, they are tried first.
         """
-        # While a floating body moves along motions that springs along gaps do not resist, its forces are not in balance.
+        # The changes increase if a floating body moves in directions that springs along gaps do not resist.
         if self._regularisation.gap_stiffness and changes[-1] > changes[-2] > min(changes):
             self._replaces_springs = True
         failure: Exception | None = None
@@ -283,8 +286,8 @@ class _Newton:
     def _solve_linearised(self, u: Array, changes: list[float], regularisation: Regularisation) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
-        suffices = self._reusable is not None and self._tangent_suffices(changes)
-        problem, self._reusable = self._reusable if suffices else None, None
+        problem = self._reusable if self._tangent_suffices(changes) else None
+        self._reusable = None
         self._reused = problem is not None
         if problem is not None:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
@@ -307,7 +310,7 @@ class _Newton:
             self._begin, problem=replace(problem, criteria=replace(problem.criteria, geometry=tolerance)), load=load,
             state=replace(self._start, extrapolation=Extrapolation()), loaded=equilibrium.with_loads(problem, load),
         )  # fmt: skip
-        paired = self._settled if self._moved_fully and problem.linearised_at is None else None
+        paired = self._settled if self._has_full_step and problem.linearised_at is None else None
         settled = settle_geometry(step, iterate, paired)
         solution = equilibrium.solve_displacements(step, settled, u, self._linear_tolerance)
         self._settled = settled
@@ -322,23 +325,26 @@ class _Newton:
     def _forcing(self, problem: Problem, load: StepLoad, u: Array, unbalanced: Array) -> float | None:
         """Return the tolerance of the linear solution from u (n_dofs,), None for that of the solver (inexact Newton method).
 
-        `unbalanced` (n_dofs,) are the residual forces of the terms at u. If their ratio to the forces of this step or of
-        earlier ones is small, the next ratio, which is about the square of this one, may be that of the last iteration.
+        `unbalanced` (n_dofs,) are the residual forces of the terms at u. Their ratio to the largest force is about squared in
+        each iteration. If the next ratio will be small enough for the last iteration, the tolerance is that of the solver.
         """
         system, lift = problem.system, load.lift
         scale = max(largest(system.right_side(load.force, lift)), self._start.largest_force)
         if problem.pairs or not problem.solver.iterative or scale == 0.0:
             return None
-        missing = largest(system.displacement(system.unknowns(u, lift), lift) - u)  # prescribed displacements
-        ratio = max(largest(system.reduced(unbalanced)) / scale, missing and missing / max(largest(u), largest(lift)))
+        # Largest prescribed displacement that u does not satisfy yet.
+        violation = largest(system.displacement(system.unknowns(u, lift), lift) - u)
+        ratio = largest(system.reduced(unbalanced)) / scale
+        ratio = max(ratio, violation and violation / max(largest(u), largest(lift)))
         return MAX_TOLERANCE * ratio if ratio**2 > self._tolerance else None
 
     def _stiffness_of_contact(self, K: bsr_array, u: Array, regularisation: Regularisation) -> csr_array | None:
         """Return the stiffness that the last contact adds to a tangent at displacements u (n_dofs,) [force / length].
 
-        It is the symmetric part of the load stiffness of fluid pressure, and that of springs, slack at u, along closed gaps
-        and along the slips of sticking constraints. These displacements hardly change as iterations converge, so that the
-        springs affect iterations only to second order (as in the augmented Lagrangian method: Alart and Curnier, 1991).
+        It consists of the symmetric part of the load stiffness of fluid pressure, and of springs along closed gaps and along
+        the slips of sticking constraints. The springs are slack at u. As iterations converge, these gaps and
+        slips hardly change, so that the springs affect iterations only to second order (as in the augmented Lagrangian
+        method: Alart and Curnier, 1991).
         """
         matrices = [fluid.tangent(u) for fluid in self._fluid(u)]
         if regularisation.gap_stiffness and self._settled is not None:
@@ -371,11 +377,11 @@ class _Newton:
         """
         fraction = 1.0
         changes = [*changes, self._relative(largest(target - u), target)]
-        last = self._has_converged(changes) or (self._reusable is not None and self._tangent_suffices(changes))
+        needs_tangent = not (self._has_converged(changes) or self._tangent_suffices(changes))
         for _ in range(HALVINGS):
             trial = target if fraction == 1.0 else u + fraction * (target - u)
             try:
-                self._terms.bodies_at(trial, tangent=not last)
+                self._terms.bodies_at(trial, tangent=needs_tangent)
             except ConvergenceError as error:
                 failure = error
             else:
