@@ -1,6 +1,6 @@
 """Degrees of freedom of the contact problem: all of them, or those of the contact surfaces after static condensation.
 
-A direct solver condenses the stiffness to the contact surfaces; all other displacements are then computed once, when the
+A direct solver condenses the stiffness matrix to the contact surfaces. All other displacements are computed once, when the
 contact forces of the load step are known.
 """
 
@@ -42,10 +42,11 @@ class ActiveDofs:
     ----------
     active : ndarray of int (k,)
         The active components.
-    compared : ndarray of int
-        Positions, among the active components, of those on which contact depends.
+    contact : ndarray of int
+        Positions, among the active components, of those that contact constraints may involve.
     determined : ndarray of int
-        Positions, among the active components, of those at which direct solvers compute the solutions of the contact problem.
+        Positions, among the active components, of those with contact or springs, which solutions of the contact problem
+        determine.
     springs : ndarray of int
         Positions of the components with springs, which are unknowns, among the active unknowns.
     T, transpose : csr_array (k, l), csr_array (l, k)
@@ -56,7 +57,7 @@ class ActiveDofs:
     def __init__(self, system: System, contact: Indices, springs: Indices, unknowns: Indices | None = None) -> None:
         involved, all_dofs = np.union1d(contact, springs), np.arange(len(system.free))
         self.active, self._unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
-        self.compared, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact, involved))
+        self.contact, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact, involved))
         self.springs = np.searchsorted(self._unknowns, springs)
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free

@@ -164,7 +164,7 @@ def _settle(
         tolerance = tolerances.geometry_tolerance(size)
         if not tolerances.inexact:
             increments.check(constraints, solution, change - tolerance, size, iterate.u)
-        settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=before[problem.dofs.compared])
+        settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=before[problem.dofs.contact])
         if not solution.settled or tolerances.inexact:
             window = ScatterWindow()
         elif change <= tolerance and not (increments.due or increments.unfinished):
@@ -281,7 +281,7 @@ class _Mixing:
             return displacement
         if self.accelerated is None:
             problem = self._step.problem
-            self.accelerated = Anderson(DEPTH, problem.dofs.compared, problem.solver.iterative)
+            self.accelerated = Anderson(DEPTH, problem.dofs.contact, problem.solver.iterative)
         return self.accelerated.mixed(before, displacement)
 
     def _shortened_step(self, before: Array, image: Array) -> Array | None:
@@ -332,7 +332,7 @@ def newton_step(
         respond = solution.response()
     except LinAlgError:
         return None
-    compared, gaps = dofs.compared, np.zeros((1 + len(constraints.tangents), len(constraints)))
+    contact, gaps = dofs.contact, np.zeros((1 + len(constraints.tangents), len(constraints)))
 
     def response_along(v: Array) -> Array:
         """Return the active components (k,) of ``S'(u) v`` for changes v of the components on which contact depends."""
@@ -346,20 +346,20 @@ def newton_step(
         merged = gaps if nodes is None else nodes.merged_gaps(gaps)
         return np.asarray(dofs.T @ respond(dofs.transpose @ force[dofs.active], merged))
 
-    changes = (image - before)[compared]
+    changes = (image - before)[contact]
     largest_change = largest(changes) or 1.0
     # With the tolerance `accuracy` itself, load steps of plastic bodies take 10 % more pairings.
-    system = LinearOperator((len(changes),) * 2, matvec=lambda v: v - response_along(v)[compared], dtype=float)
+    system = LinearOperator((len(changes),) * 2, matvec=lambda v: v - response_along(v)[contact], dtype=float)
     v, _ = gmres(system, changes / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
     response_size = largest(largest_change * v - changes)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable, except where layers soften.
     if not response_size <= (largest_change if constraints.branches is None else np.inf):
         return None
     next_pairing, determined = image.copy(), dofs.determined
-    if len(determined) > len(compared):  # there are springs of floating bodies
+    if len(determined) > len(contact):  # there are springs of floating bodies
         next_pairing[determined] += largest_change * response_along(v)[determined]
     else:
-        next_pairing[compared] = before[compared] + largest_change * v
+        next_pairing[contact] = before[contact] + largest_change * v
     return next_pairing, response_size / (largest_change * largest(v) or 1.0)
 
 

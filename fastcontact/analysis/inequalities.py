@@ -29,9 +29,9 @@ from fastcontact.model.pretension import loose_bolts_remark
 from fastcontact.model.rigid_motions import cone_rows, generalised_forces, grouped_by_body, needed_friction, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION, SUM_ROUND_OFF
 
-# Number of times that contact displaces fluid from a node in a load step after which the node stays dry. At the front of the
-# fluid a node may be neither dry, because its mean pressure is below that of the fluid, nor wet, because its gap would close.
-DISPLACED = 3
+# A node stays dry after contact has displaced fluid from it this number of times in a load step. At the front of the fluid, a
+# node may be neither dry, because its mean pressure is below that of the fluid, nor wet, because its gap would close.
+DISPLACEMENTS_UNTIL_DRY = 3
 
 
 @dataclass(eq=False)
@@ -84,7 +84,7 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
         configuration = problem.configuration(name, state, load, paired_at, u)
         pressure, fluid = iterate.pressure.get(name), iterate.fluid.get(name)
         if pressure is not None and fluid is not None:  # impermeable where the fluid has been displaced too often
-            pressure = np.where(fluid[1] < DISPLACED, pressure, np.inf)
+            pressure = np.where(fluid[1] < DISPLACEMENTS_UNTIL_DRY, pressure, np.inf)
         parts[name] = pair.constraints(replace(configuration, pressure=pressure, rounded=iterate.rounded))
         if (wetted := parts[name].wetted) is not None:
             wet = wetted.pressure > 0.0
@@ -153,10 +153,11 @@ class StepContext:
         """Whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure."""
         return not (self.problem.solver.iterative or self.load.fluids)
 
-    def driven(self, constraints: Constraints) -> Array:
-        """Return the slips imposed by supports and obstacles in the step.
+    def imposed_slips(self, constraints: Constraints) -> Array:
+        """Return the slips that supports and obstacles impose in the step.
 
-        They are divided by the largest displacement, imposed or present, so that round-off can be recognised.
+        They are divided by the largest displacement at the beginning of the step or imposed in it, so that round-off can be
+        recognised.
 
         Returns
         -------
@@ -235,7 +236,7 @@ class _PairingProblem:
             return active_set.solve(step.loaded, condensed, self.active, self.accuracy, u)
         from fastcontact.analysis.friction import solve as friction
 
-        condensed, path = replace(condensed, driven=step.driven(self.constraints)), step.path
+        condensed, path = replace(condensed, driven=step.imposed_slips(self.constraints)), step.path
         if isinstance(path, LastIncrement) and len(path.slip) == len(condensed):
             arguments = step.loaded, path.since_its_beginning(condensed), self.active, self.accuracy, u
             iterate.frictional = path.over_whole_step(friction.solve(*arguments, iterate.frictional))

@@ -51,7 +51,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 ByRamp = Mapping[PartHistory, Array]
 # Shear, relative to the frictional capacity, that is neglected by default at nodes that close and slide.
-NEGLIGIBLE = 1e-3
+NEGLIGIBLE_SHEAR = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +187,7 @@ class Problem:
             return criteria.friction_while_touching
         whole_steps = self.model.mesh.dim == 3 or criteria.geometry_updates is not None or floats
         pairs = [pair for pair in self.pairs.values() if pair.friction and not isinstance(pair.primary, RigidSide)]
-        return NEGLIGIBLE if not whole_steps and all(pair.weighs_gaps for pair in pairs) else 1.0
+        return NEGLIGIBLE_SHEAR if not whole_steps and all(pair.weighs_gaps for pair in pairs) else 1.0
 
     @property
     def extrapolates(self) -> bool:
@@ -204,15 +204,15 @@ class Problem:
         """Return the loads at an instant of the ramp."""
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         lift = self.system.lift(prescribed.ravel(), self.factors(self.model.relations, instant))
-        pairs, at = self.model.contact, partial(multiplier, ramp=self.ramp, instant=instant)
+        pairs, factor = self.model.contact, partial(multiplier, ramp=self.ramp, instant=instant)
         sides = [(pair, self.pairs[pair.name].primary) for pair in pairs]
-        obstacles = {p.name: at(p.ramp) * side.motion for p, side in sides if isinstance(side, RigidSide)}
-        clearances = {p.name: at(p.clearance_ramp) for p in pairs if p.clearance_ramp is not None}
+        obstacles = {p.name: factor(p.ramp) * side.motion for p, side in sides if isinstance(side, RigidSide)}
+        clearances = {p.name: factor(p.clearance_ramp) for p in pairs if p.clearance_ramp is not None}
         angles = {p.name: angle_at(p, self.ramp, instant) for p in pairs if p.rotation is not None}
-        friction = {p.name: at(p.friction_ramp) for p in pairs if p.friction_ramp is not None}
-        fluids = {p.name: p.fluid.pressure * at(p.fluid.ramp) for p in pairs if p.fluid is not None}
+        friction = {p.name: factor(p.friction_ramp) for p in pairs if p.friction_ramp is not None}
+        fluids = {p.name: p.fluid.pressure * factor(p.fluid.ramp) for p in pairs if p.fluid is not None}
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
-        following = tuple(at(table) for _, table in self.following)
+        following = tuple(factor(table) for _, table in self.following)
         temperatures = self.factors(self.model.temperatures, instant)
         rise = None if self.bodies is None else self.model.temperature_rise(temperatures)
         return StepLoad(lift, force, obstacles, clearances, angles, following, friction, fluids, rise)

@@ -125,6 +125,11 @@ IncrementSolver = Callable[[Array, Mask, Mask, Array | None], FrictionSolution]
 GROWTH = 1 / 32
 
 
+def _components(vectors: Array, directions: tuple[Array, ...]) -> Array:
+    """Return the components (k, m) of vectors (m, dim) along each of k directions (m, dim)."""
+    return np.asarray((vectors * np.stack(directions)).sum(axis=2))
+
+
 @dataclass(frozen=True, eq=False)
 class LoadPath:
     """Data of the constraints at the beginning of a load step, for friction along the load path in increments.
@@ -159,9 +164,8 @@ class LoadPath:
         closing : ndarray (1 + k, q)
             Gaps, then the components of `closing` [length].
         """
-        tangents, (traction, closing) = np.stack(directions)[:, rows], (self.traction[rows], self.closing[rows])
-        forces = np.vstack([self.normal[rows], (traction * tangents).sum(axis=2)])
-        return forces, np.vstack([self.gap[rows], (closing * tangents).sum(axis=2)])
+        forces = np.vstack([self.normal, _components(self.traction, directions)])
+        return forces[:, rows], np.vstack([self.gap, _components(self.closing, directions)])[:, rows]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,18 +197,18 @@ class LastIncrement:
 
     def since_its_beginning(self, constraints: Constraints) -> Constraints:
         """Return the constraints with slips measured from the beginning of the increment."""
-        before = (self.slip * np.stack(constraints.directions)).sum(axis=2)
-        return replace(constraints, slip0=constraints.slip0 - before)
+        return replace(constraints, slip0=constraints.slip0 - _components(self.slip, constraints.directions))
 
     def over_whole_step(self, solution: Solution) -> Solution:
         """Return the solution with the slips and the integrals of the step, given the solution of its last increment."""
-        directions = np.stack(solution.directions, axis=1)
-        vectors = self.slip, self.slip_before_closing, self.traction
-        before, slip_before_closing, traction = ((v[:, None] * directions).sum(axis=2) for v in vectors)
-        forces = np.vstack([self.normal, traction.T]), np.vstack([solution.multiplier, solution.tangential.T])
-        integrals = self.integrals + _integrals(*forces, solution.slip.T, 1.0 - self.begin)
-        slip = solution.slip + before
-        return replace(solution, slip=slip, integrals=integrals, slip_before_closing=slip_before_closing)
+        before = np.vstack([self.normal, _components(self.traction, solution.directions)])
+        after = np.vstack([solution.multiplier, solution.tangential.T])
+        return replace(
+            solution,
+            slip=solution.slip + _components(self.slip, solution.directions).T,
+            integrals=self.integrals + _integrals(before, after, solution.slip.T, 1.0 - self.begin),
+            slip_before_closing=_components(self.slip_before_closing, solution.directions).T,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,15 +277,15 @@ class Solution:
         return cls(u, multiplier, gap, active, wanted, settled, 1, no_tangents, no_tangents, active)
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
-        """Return normal and tangential forces (1 + k, m) in components along different tangents (m, dim) [force].
+        """Return the normal and tangential forces (1 + k, m) in components along other tangents (m, dim) [force].
 
-        Tangents of different pairings may differ by any angle in the tangent plane. The result is None if the solution does
-        not have `m` constraints.
+        Tangents of two pairings may differ by any angle in the tangent plane. The result is None if the number of constraints
+        of the solution is not `m`.
         """
         if self.tangential.shape != (m, len(directions)):
             return None
         vectors = (self.tangential.T[:, :, None] * np.stack(self.directions)).sum(axis=0)
-        return np.vstack([self.multiplier, (vectors * np.stack(directions)).sum(axis=2)])
+        return np.vstack([self.multiplier, _components(vectors, directions)])
 
 
 def in_increments(

@@ -1,4 +1,4 @@
-"""Bisection of load steps that do not converge, or in which closing nodes do too much of the frictional work.
+"""Bisection of load steps that do not converge, or in which nodes that close do too much of the frictional work.
 
 A load step that fails leaves the state unchanged, so that it can be divided into two substeps. With nonlinear bodies, later
 substeps have the size of the last one, which doubles after a substep that took few iterations.
@@ -38,8 +38,8 @@ def advance(problem: Problem, state: State, index: int, begin: float, end: float
     numbers of iterations, the slip and the dissipation of all substeps. If there are several, ``iterations["substeps"]``
     lists the instants of their ends.
 
-    With friction, loads that already act at the beginning of the first step are applied before it, in a substep of no
-    duration, unless there is no equilibrium under them.
+    With friction, loads that already act at the beginning of the first step are first applied in a substep of zero duration,
+    unless there is no equilibrium under them.
 
     Raises
     ------
@@ -75,20 +75,20 @@ def _substeps(
     begin, end = span
     middle = 0.5 * (begin + end)
     max_halvings = problem.criteria.max_halvings * (1 if problem.bodies is None else 2)
-    last = halved >= max_halvings or not begin < middle < end
+    is_last = halved >= max_halvings or not begin < middle < end
     if halved >= state.halved or not begin < middle < end:
         try:
             after, result = load_step(problem, state, index, end)
-            ambiguous = not last and _has_two_equilibria(problem, state, after, index)
+            ambiguous = not is_last and _has_two_equilibria(problem, state, after, index)
             if ambiguous:
                 log.info("step %d from %.6g to %.6g has two equilibria with friction, cut in halves", index, begin, end)
-            if last or not (ambiguous or _slides_while_touching(problem, state, after)):
+            if is_last or not (ambiguous or _slides_while_touching(problem, state, after)):
                 if problem.bodies is not None:  # how many times the next step is halved before its first attempt
                     converged_fast = len(result.iterations["history"]) <= FEW_ITERATIONS
                     after = replace(after, halved=max(halved - converged_fast, 0))
                 return after, [result]
         except ConvergenceError as error:
-            if last or not error.smaller_steps_help:
+            if is_last or not error.smaller_steps_help:
                 where = f"from {begin:.6g} to {end:.6g}"
                 times = "once" if halved == 1 else f"{halved} times"
                 if halved:

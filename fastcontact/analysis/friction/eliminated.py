@@ -116,7 +116,7 @@ class Eliminated:
         rows, free = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
         self._prescribed = constraints.prescribed
-        self._inexact, self._last = inexact, tolerance
+        self._inexact, self._last_tolerance = inexact, tolerance
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
         unknown_compliance = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
@@ -188,8 +188,8 @@ class Eliminated:
         B, nodes = csr_array(vstack(rows, format="csr")), self._nodes[equations.nonzero()[1]]
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
         friction_terms = self._friction_terms(B, np.flatnonzero(closed), sliding) if len(sliding.at) else None
-        self._last, c, C = self._accuracy(y, gaps), -self._free[equations], self._compliance[equations]
-        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last, friction_terms, C)
+        self._last_tolerance, c, C = self._accuracy(y, gaps), -self._free[equations], self._compliance[equations]
+        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last_tolerance, friction_terms, C)
         forces = np.zeros_like(y)
         forces[equations] = multiplier
         forces[1:, sliding.at] += sliding.force(forces[0, sliding.at], u)
@@ -211,7 +211,7 @@ class Eliminated:
     def finish(self) -> bool:
         """Use the full tolerance in further steps; return whether the last step was less accurate."""
         self._inexact = False
-        return self._last > self._tolerance
+        return self._last_tolerance > self._tolerance
 
     def _sliding(self, y: Array, gaps: Array, at: Indices) -> _Sliding:
         """Return the friction terms of the sliding constraints numbered `at` (q,), linearised at `y` and `gaps`."""
