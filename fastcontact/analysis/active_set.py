@@ -100,13 +100,8 @@ def _response(loaded: Loaded, B: csr_array, rows: Indices, compliance: Complianc
 
     `B` (q, n) contains the rows of these constraints, and `compliance` is that of all constraints.
     """
-    F = loaded.delassus(B)[1]
-    C = None if compliance is None else compliance.block(rows)
-    if C is not None:
-        F = F + (np.diag(C) if C.ndim == 1 else C)
-    if not len(rows):
-        return response(loaded, B, rows, np.negative)
-    solve_dense = lu_solver(F)
+    F, C = loaded.delassus(B)[1], np.zeros(len(rows)) if compliance is None else compliance.block(rows)
+    solve_dense = lu_solver(F + (np.diag(C) if C.ndim == 1 else C)) if len(rows) else np.zeros_like
     return response(loaded, B, rows, lambda gaps: -solve_dense(gaps))
 
 

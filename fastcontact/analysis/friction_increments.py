@@ -7,7 +7,7 @@ noticeably.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,30 +21,28 @@ from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
+@dataclass(eq=False)
 class FrictionIncrements:
-    """Decision whether friction of a load step is solved in increments, and when this begins; see `geometry_loop`.
+    """Decision whether the friction of a load step is solved in increments, and in which pairings; see `geometry_loop`.
 
-    Parameters
+    Attributes
     ----------
     step : StepContext
         If its geometry converges quadratically, the increments are solved once it has nearly converged, otherwise once it has
         converged.
-
-    Attributes
-    ----------
     due : bool
         Whether the next pairing is solved in increments.
     unfinished : bool
         Whether the last pairing was solved in increments, so that its last increment is to be solved again.
     """
 
-    def __init__(self, step: StepContext) -> None:
-        self._step, self._shear_limit = step, step.problem.friction_while_touching
-        self.due = self.unfinished = self._settled = False
-        self._paired, self._shift = None, np.inf
-
-    # Constraints of the last pairing that was solved in increments.
-    _paired: StackedConstraints | None
+    step: StepContext
+    due: bool = False
+    unfinished: bool = False
+    # Constraints of the last pairing that was solved in increments, and the last change of the gaps and slips since then.
+    _paired: StackedConstraints | None = None
+    _shift: float = np.inf
+    _settled: bool = False
 
     def with_path(
         self, step: StepContext, constraints: StackedConstraints, u: Array, nodes: SharedNodes | None
@@ -60,25 +58,26 @@ class FrictionIncrements:
         self.due, self.unfinished, self._paired = False, path is not None, constraints
         return step if path is None else replace(step, path=path)
 
-    def check(self, constraints: StackedConstraints, solution: Solution, excess: float, size: float, u: Array) -> None:
+    def update(self, constraints: StackedConstraints, solution: Solution, excess: float, size: float, u: Array) -> None:
         """Set `due`, given the solution of a pairing with the displacements `u` (n_dofs,) [length].
 
         `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].
         """
-        near = NOTABLE if self._step.linearises_contact else 0.0
-        self._settled = self._shear_limit < 1.0 and solution.settled and excess <= near * size
+        shear_limit = self.step.problem.friction_while_touching
+        near = NOTABLE if self.step.linearises_contact else 0.0
+        self._settled = shear_limit < 1.0 and solution.settled and excess <= near * size
         self._active, self._size = solution.active, size
         self.due = self._outdated(constraints, u)
         if self._paired is None:
-            self.due = self._settled and _slides(self._step, constraints, solution, self._shear_limit)
+            self.due = self._settled and _slides(self.step, constraints, solution, shear_limit)
 
     def _outdated(self, constraints: StackedConstraints, u: Array) -> bool:
         """Return whether the geometry has changed since the increments were solved, but by less than the last time.
 
         Slips of earlier increments are those of the pairing in which they were solved.
         """
-        before, start = self._paired, self._step.state.u
-        if before is None or not (self._settled and self._step.problem.until_settled):
+        before, start = self._paired, self.step.state.u
+        if before is None or not (self._settled and self.step.problem.until_settled):
             return False
         if not len(before) == len(constraints) == len(self._active):  # slips of other constraints cannot be used
             return True

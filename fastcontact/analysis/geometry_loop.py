@@ -15,7 +15,7 @@ of second order.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -124,7 +124,7 @@ def _settle(
         residual = max(residual, RESIDUAL * NOTABLE if step.state.extrapolation.ratio else NOTABLE)
         iterate.u = step.state.extrapolation.predicted(iterate.u, degree=1)
     tolerances = Tolerances(problem.solver, criteria, residual, step.state.gap_round_off, step.expected)
-    mixing, window = _Mixing(step), ScatterWindow()
+    mixing, window = _Mixing(step, step.linearises_contact), ScatterWindow()
     for update in range(limit + 1):
         if update == 0 and paired is not None and paired.paired_at is not None:
             iterate.u[problem.contact_dofs], constraints = paired.paired_at, paired.constraints
@@ -146,7 +146,7 @@ def _settle(
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
             step = replace(step, path=solution.last_increment)
-            mixing, window = _Mixing(step), ScatterWindow()
+            mixing, window = _Mixing(step, step.linearises_contact), ScatterWindow()
         before = iterate.u[problem.dofs.active]
         change = largest(displacement - before)
         # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
@@ -163,7 +163,7 @@ def _settle(
             continue
         tolerance = tolerances.geometry_tolerance(size)
         if not tolerances.inexact:
-            increments.check(constraints, solution, change - tolerance, size, iterate.u)
+            increments.update(constraints, solution, change - tolerance, size, iterate.u)
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=before[problem.dofs.contact])
         if not solution.settled or tolerances.inexact:
             window = ScatterWindow()
@@ -186,7 +186,7 @@ def _settle(
         changes = np.zeros_like(iterate.u)
         changes[problem.dofs.active] = displacement - before
         raise ConvergenceError(geometry_not_converged(problem, iterate.history, changes, limit), iterate.history)
-    increments.check(constraints, solution, 0.0, 0.0, iterate.u)
+    increments.update(constraints, solution, 0.0, 0.0, iterate.u)
     if increments.due or increments.unfinished:
         del iterate.history[-limit - 1 :]
         return _settle(step, iterate, increments)
@@ -210,32 +210,35 @@ def _store_solution(
     iterate.history.append(entry | ({"rounded": True} if iterate.rounded else {}))
 
 
+@dataclass(eq=False)
 class _Mixing:
     """Computation of the next iterate: by Newton's method while it converges, otherwise by Anderson acceleration.
 
     Anderson acceleration uses only iterates with the same active set, between which the geometry varies smoothly, unless
     active sets alternate, because each of them then results from the geometry of the other.
 
-    Parameters
-    ----------
-    step : StepContext
-
     Attributes
     ----------
+    step : StepContext
+    uses_newton : bool
+        Whether Newton's method is applied.
     accelerated : Anderson, optional
         Anderson acceleration with the earlier iterates that it uses; None to discard them.
     contraction : float
         Factor by which a solution contracts changes of the geometry, from the last Newton step; infinite if unknown [-].
     """
 
-    def __init__(self, step: StepContext) -> None:
-        self._step, self.accelerated = step, None
-        self._last_state, self._earlier_states, self._cycles = b"", set[bytes](), False
-        # With cohesive layers: start of the last Newton step, the step, the slope at its start, and the fraction taken.
-        self._line: tuple[Array, Array, float, float] | None = None
-        self._uses_newton, self._last_change, self.contraction = step.linearises_contact, np.inf, np.inf
-
-    accelerated: Anderson | None
+    step: StepContext
+    uses_newton: bool
+    accelerated: Anderson | None = None
+    contraction: float = np.inf
+    _last_change: float = np.inf
+    # Active set and branches of the last solution, those of all earlier ones, and whether they alternate.
+    _last_state: bytes = b""
+    _earlier_states: set[bytes] = field(default_factory=set)
+    _cycles: bool = False
+    # With cohesive layers: start of the last Newton step, the step, the slope at its start, and the fraction taken.
+    _line: tuple[Array, Array, float, float] | None = None
 
     def next(
         self, settled: SettledContact, before: Array, displacement: Array, tolerance: float, inexact: bool
@@ -255,13 +258,13 @@ class _Mixing:
         # While this state is constant, the solution depends smoothly on the geometry.
         state = solution.active.tobytes() + (b"" if branches is None else branches.tobytes())
         same_state = self._last_state == state
-        converges = self._uses_newton and change <= self._last_change
-        self._uses_newton = converges or (branches is not None and (same_state or self._line is not None))
+        converges = self.uses_newton and change <= self._last_change
+        self.uses_newton = converges or (branches is not None and (same_state or self._line is not None))
         if branches is not None and change > SAFETY * self.contraction * self._last_change:
             self.contraction = np.inf  # it was determined with other branches
         self._line, self._last_change = None, change
-        if self._uses_newton and solution.settled and SAFETY * self.contraction * change > tolerance:
-            newton_result = newton_step(self._step, settled, before, displacement, tolerance / change)
+        if self.uses_newton and solution.settled and SAFETY * self.contraction * change > tolerance:
+            newton_result = newton_step(self.step, settled, before, displacement, tolerance / change)
             if newton_result is not None:
                 next_pairing, self.contraction = newton_result
                 if branches is None:
@@ -272,7 +275,7 @@ class _Mixing:
                     return next_pairing
                 self.accelerated = None  # the step would increase the energy, which the solution decreases
                 return displacement
-        self._cycles |= not (same_state or self._uses_newton) and state in self._earlier_states
+        self._cycles |= not (same_state or self.uses_newton) and state in self._earlier_states
         self._last_state = state if solution.settled else b""
         self._earlier_states.add(self._last_state)
         if inexact or not (same_state or self._cycles or settled.iterate.rounded):
@@ -280,7 +283,7 @@ class _Mixing:
         if inexact:
             return displacement
         if self.accelerated is None:
-            problem = self._step.problem
+            problem = self.step.problem
             self.accelerated = Anderson(DEPTH, problem.dofs.contact, problem.solver.iterative)
         return self.accelerated.mixed(before, displacement)
 

@@ -70,15 +70,16 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     step = prepare_start(problem, state, index, load)
-    heat_solution, solution = None, newton(step, load)
+    temperatures, solution = None, newton(step, load)
     if problem.heat is not None:
-        heat_solution, solution = thermal_coupling.settle_heat(
+        temperatures, solution = thermal_coupling.settle_heat(
             problem, step.state, load_without_conduction, instant, rise, solution, partial(newton, step)
         )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
-    rise_at_end = None if heat_solution is None else heat_solution.rise
-    end, result = _end_of_step(step, solution, instant, rise_at_end, iterations)
-    return end, result if heat_solution is None else heat_solution.with_heat_results(problem, result)
+    if temperatures is None:
+        return _end_of_step(step, solution, instant, None, iterations)
+    end, result = _end_of_step(step, solution, instant, temperatures.rise, iterations)
+    return end, temperatures.with_heat_results(problem, result)
 
 
 def _end_of_step(

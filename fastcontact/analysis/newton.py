@@ -270,18 +270,17 @@ class _Newton:
 
     def _regularisations(self) -> list[Regularisation]:
         """Return the regularisations to try, in order."""
-        floats, settled = self._problem.floating_bodies is not None, self._settled
-        closed = settled is not None and settled.solution.active.any()
-        iterative = self._problem.solver.iterative
-        unmodified = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and iterative)]]
-        replaces = self._replaces_springs or (settled is not None and settled.constraints.tangents != ())
-        along_gaps = Regularisation(gap_stiffness=GAP_STIFFNESS, stiff=floats, replaces_springs=replaces)
-        with_springs = [along_gaps] if closed else []
-        if self._regularisation in with_springs:
-            unmodified = []  # the unmodified tangent failed before
-        geometric = self._regularisation.geometric
-        parts = range(min(geometric + 1, COMPLETE))[::-1]
-        return [*unmodified, *with_springs, *(Regularisation(part, stiff=floats) for part in parts)]
+        stiff, settled = self._problem.floating_bodies is not None, self._settled
+        tangents = [Regularisation()]
+        if stiff and self._problem.solver.iterative:  # with a direct solver, springs are always stiff
+            tangents.append(Regularisation(stiff=True))
+        if settled is not None and settled.solution.active.any():
+            replaces_springs = self._replaces_springs or settled.constraints.tangents != ()
+            along_gaps = Regularisation(COMPLETE, GAP_STIFFNESS, stiff, replaces_springs)
+            # If springs were needed in the last iteration, the unmodified tangent has failed before.
+            tangents = [along_gaps] if self._regularisation == along_gaps else [*tangents, along_gaps]
+        fewer_parts = range(min(self._regularisation.geometric + 1, COMPLETE))[::-1]
+        return [*tangents, *(Regularisation(part, stiff=stiff) for part in fewer_parts)]
 
     def _solve_linearised(self, u: Array, changes: list[float], regularisation: Regularisation) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
