@@ -25,12 +25,12 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 @dataclass(frozen=True, eq=False)
 class Sectors:
-    """The sectors of a ring.
+    """The sectors of a ring, or a single sector if the model has no cyclic symmetry.
 
     Attributes
     ----------
     number : int
-        Number N of sectors in the ring.
+        Number N of sectors in the ring; 1 without cyclic symmetry.
     turn : ndarray (dim, dim)
         Rotation of vectors from one sector to the next [-].
     periodic_interfaces : list of PeriodicInterface
@@ -45,11 +45,11 @@ class Sectors:
     centre: Array
 
     @classmethod
-    def of(cls, model: Model) -> Sectors | None:
-        """Return the sectors of a model; None without cyclic symmetry. ModelError if axes or numbers of sectors differ."""
+    def of(cls, model: Model) -> Sectors:
+        """Return the sectors of a model. Raises ModelError if the axes or the numbers of sectors of symmetries differ."""
         periodic_interfaces = [interface for interface in model.periodic_interfaces if interface.relation is not None]
         if not periodic_interfaces:
-            return None
+            return cls(1, np.eye(model.mesh.dim), [], np.zeros(model.mesh.dim))
         first = periodic_interfaces[0]
         assert first.turn is not None
         for interface in periodic_interfaces:
