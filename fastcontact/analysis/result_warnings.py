@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.facet_sag import facet_length, sag_warnings
@@ -32,7 +32,6 @@ from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.mass import cell_portions
-from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.elasticity.recovery import BATCH
 from fastcontact.elasticity.stiffness import rigid_modes
@@ -42,6 +41,7 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.model import Model
 from fastcontact.model.rigid_motions import body_name
+from fastcontact.results.layout import cut_at_interfaces
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
@@ -102,15 +102,14 @@ def result_warnings(
     rises = load.rise, state.rise  # by prescribed temperatures of nonlinear bodies, and by heat conduction
     loaded = any(values is not None and values.any() for values in (load.force, load.lift, *rises))
     sag = sag_warnings(problem, state, last)
-    clearances = _open_clearances(problem, state)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.kind == "gap_only":
             continue
-        without_force = [] if name in clearances else _open_contact(problem, name, last, name in state.touched, loaded)
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
         undetermined = _undetermined_tractions(pair, contact, pair.nodes_with_undetermined_traction(configuration))
-        warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
+        warnings += [*_deep_penetration(pair, contact, state.u), *_open_contact(problem, state, name, last, loaded)]
+        warnings += undetermined
         unresolved = list(_coarse_contact(pair, contact, state))
         if name in sag and not (unresolved and isinstance(pair.primary, RigidSide)):  # refinement also reduces the sag
             unresolved = [sag[name]]
@@ -306,22 +305,8 @@ def _undetermined_positions(last: StepResult, free_bodies: FreeBodies | None) ->
 
 
 def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
-    laws, field = [material for material, _ in problem.model.materials], problem.field
-    # Infinite except for homogeneous `LinearElastic` materials. Where it is infinite, strains are computed below.
-    moduli = (law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf for law in laws)
-    shear = np.array([*moduli])
-    strain, interface, interior = 0.0, last.material_stress, np.ones(len(last.stress), bool)
-    if interface is not None:
-        interior[interface.points] = False
-        strain = float((recovery.von_mises(interface.stress) / (3 * shear[interface.material])).max())
-    for name, block in problem.model.mesh.solids.items():
-        shear_of_cells = shear[field.material_numbers[name]]
-        at_nodes = last.von_mises[block] * interior[block] / (3 * shear_of_cells[:, None])
-        strain = max(strain, float(at_nodes.max(initial=0.0)))
-        others = np.flatnonzero(np.isinf(shear_of_cells))
-        mean = last.stress[block[others]].mean(axis=1)
-        strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
-        strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
+    """Yield warnings where strains, or plastic strains, are too large for linear kinematics."""
+    strain = largest_strain(problem.model, last)
     if strain > NEGLECTED:
         yield (
             f"the largest equivalent strain is {strain:.3f}, beyond the {NEGLECTED} up to which linear kinematics are "
@@ -336,6 +321,18 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
             "are valid: contact pressures there are too low, under a ball by 10 % at 0.2; "
             "strain='finite' has no such limit"
         )
+
+
+def largest_strain(model: Model, step: StepResult) -> float:
+    """Return the largest equivalent elastic strain at the nodes of a model at the end of a step [-]."""
+    field, (mesh, _, stress) = model.material_field(), cut_at_interfaces(model.mesh, step)
+    largest_in_cells = 0.0
+    for name, block in mesh.solids.items():
+        compliance = field.compliance[field.rows[name]]
+        for nodes in block.T:
+            strain = recovery.equivalent_strain(np.einsum("cij,cj->ci", compliance, stress[nodes]))
+            largest_in_cells = max(largest_in_cells, float(strain.max(initial=0.0)))
+    return largest_in_cells
 
 
 def _large_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
@@ -361,19 +358,16 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
         return
+    neglected, work_by_body = _work_on_strains(problem, last)
+    # Bodies whose work on strains is round-off relative to that of other bodies are free of stress.
+    least_work = max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY)
+    ratio = np.abs(neglected) / np.maximum(work_by_body, least_work)
+    # Even small rotations matter under large stresses. In bodies whose stresses are only due to neglected strains, the works
+    # on strains and on neglected strains are about equal.
+    is_preloaded = bool(((ratio > NEGLECTED) & (ratio < 0.5)).any())
     friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
-    if angle > 0.5 * OUT_OF_BALANCE * friction or _is_preloaded(problem, last):
-        yield from _neglected_rotation(problem, last, angle)
-
-
-def _is_preloaded(problem: Problem, last: StepResult) -> bool:
-    """Return whether the stresses of a body are so large that even small rotations matter, estimated at centres of cells.
-
-    In bodies without other stresses than those due to neglected strains, the works on strains and on neglected strains are
-    about equal. Such bodies are not included.
-    """
-    ratio = _ratio(*_work_on_strains(problem, last, at_centres=True))
-    return bool(((ratio > NEGLECTED) & (ratio < 0.5)).any())
+    if angle > 0.5 * OUT_OF_BALANCE * friction or is_preloaded:
+        yield from _neglected_rotation(problem, last, angle, neglected, ratio)
 
 
 def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
@@ -392,20 +386,14 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     return float(square**0.5), point
 
 
-def _open_clearances(problem: Problem, state: State) -> set[str]:
-    """Return the names of automatically detected pairs that begin open and never close, such as a shank in its hole."""
-    gap_by_pair = {pair.name: pair.detected_gap for pair in problem.model.contact if pair.detected_gap is not None}
-    if not state.touched & gap_by_pair.keys():
-        return set()
-    least_gap = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
-    return {name for name, gap in gap_by_pair.items() if gap > least_gap and name not in state.touched}
-
-
-def _open_contact(problem: Problem, name: str, last: StepResult, touched: bool, loaded: bool) -> Iterator[str]:
+def _open_contact(problem: Problem, state: State, name: str, last: StepResult, loaded: bool) -> Iterator[str]:
     """Yield a warning if a pair never closed, or is open although loads still act."""
-    pair, contact = problem.pairs[name], last.contact[name]
+    pair, contact, touched = problem.pairs[name], last.contact[name], name in state.touched
     search_distance, facing = pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
-    smallest = float(facing.min(initial=np.inf))
+    smallest, round_off = float(facing.min(initial=np.inf)), LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+    detected_gaps = {pair.name: pair.detected_gap for pair in problem.model.contact if pair.detected_gap is not None}
+    if not touched and detected_gaps.get(name, 0.0) > round_off and state.touched & detected_gaps.keys():
+        return  # an automatically detected clearance, such as that of a shank in its hole, may remain open
     gap = f"the smallest gap is {smallest:.4g}" if len(facing) else "no node faces the other side"
     if contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None:  # visible in results
         return
@@ -414,7 +402,7 @@ def _open_contact(problem: Problem, name: str, last: StepResult, touched: bool, 
             f"contact '{name}' carries nothing where its sides penetrate by {-smallest:.4g}, more than its "
             f"search_distance {search_distance:.4g}: raise that, or use more load steps"
         )
-    elif smallest < -LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max()) and not touched:
+    elif smallest < -round_off and not touched:
         yield (
             f"contact '{name}' carries nothing although its sides penetrate by {-smallest:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
@@ -601,21 +589,24 @@ def _alternation_matrix(side: Surface) -> csr_array:
 
     On quadratic facets they alternate between corners and other nodes, and on linear ones between any two.
     """
-    adjacency, kind = side.node_adjacency.tocoo(), np.arange(len(side.points))
-    if side.order == 2:
-        kind[:] = 0
-        for block in side.blocks:
-            kind[block.local[:, : elements.get(block.element).n_corners]] = 1
-    row, column = adjacency.coords
-    differ = kind[row] != kind[column]
-    return csr_array((adjacency.data[differ], (row[differ], column[differ])), shape=adjacency.shape)
+    if side.order == 1:
+        return side.node_adjacency
+    is_corner = np.zeros(len(side.points))
+    for block in side.blocks:
+        is_corner[block.local[:, : elements.get(block.element).n_corners]] = 1.0
+    corners, others = diags_array(is_corner), diags_array(1.0 - is_corner)
+    return csr_array(corners @ side.node_adjacency @ others + others @ side.node_adjacency @ corners)
 
 
-def _neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iterator[str]:
-    """Yield a warning for the body in which linear kinematics neglect most; `angle` is the largest rotation [radian]."""
+def _neglected_rotation(
+    problem: Problem, last: StepResult, angle: float, neglected: Array, ratio: Array
+) -> Iterator[str]:
+    """Yield a warning for the body in which linear kinematics neglect most.
+
+    `angle` is the largest rotation [radian], `neglected` (n_bodies,) the work on neglected strains [energy], and `ratio`
+    (n_bodies,) its magnitude relative to the work on strains [-].
+    """
     mesh = problem.model.mesh
-    neglected, work_by_body = _work_on_strains(problem, last)
-    ratio = _ratio(neglected, work_by_body)
     worst = int(np.argmax(ratio))
     if ratio[worst] > NEGLECTED:
         name = body_name(mesh, bodies(mesh)[1], worst)
@@ -665,18 +656,10 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
     return capacity
 
 
-def _ratio(neglected: Array, work_by_body: Array) -> Array:
-    """Return the ratio (n_bodies,) of the results of `_work_on_strains` [-]."""
-    # Bodies whose work on strains is round-off relative to that of other bodies are free of stress.
-    return np.abs(neglected) / np.maximum(work_by_body, max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY))
-
-
-def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = False) -> tuple[Array, Array]:
+def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
     """Return the work of stresses on neglected strains, and the integral of its absolute value on linear strains.
 
     Both are arrays (n_bodies,) [energy].
-
-    With `at_centres`, strains at the centres of cells are used, which is faster and underestimates those of bending.
     """
     mesh, axisymmetric = problem.model.mesh, problem.model.kinematics == "axisymmetric"
     count, body = bodies(mesh)
@@ -684,8 +667,6 @@ def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = Fals
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, weights = element.quadrature
-        if at_centres:
-            xi, weights = element.nodes[: element.n_corners].mean(axis=0)[None], np.array([weights.sum()])
         N, dN = element.shape(xi), element.gradient(xi)
         for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
             slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
