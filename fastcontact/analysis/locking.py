@@ -5,9 +5,9 @@ Meth. Engng 24, 1987). In nearly incompressible cells only the mean stress is us
 stress, and with it the contact pressure, alternates from cell to cell (Hughes, The finite element method, 1987, section
 4.3.7).
 
-`Comparison` measures volumetric locking by a lower bound of the excess stiffness. Let K be the stiffness of the model, K - S
-that of a reference without locking, and S the excess. For the forces of the solution u, the potential energy of the reference
-is lower than that of the model by
+`relative_excess` measures volumetric locking by a lower bound of the excess stiffness. Let K be the stiffness of the model,
+K - S that of a reference without locking, and S the excess. For the forces of the solution u, the potential energy of the
+reference is lower than that of the model by
 
     D = u.S u / 2 + max over x of (x.S u - x.(K - S) x / 2),
 
@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, cg
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
@@ -52,6 +53,9 @@ SUSPICIOUS, ALTERNATING = 0.45, 0.25
 BENDING = 0.45
 # Fraction of the elastic energy of all bodies above which the error of a single body is examined.
 NOTABLE_ENERGY = 0.1
+# Remedies for elements that lock with any kind of integration, and for other elements.
+OTHER_ELEMENTS = "use quadrangles or hexahedra, or quadratic elements (generate.to_quadratic)"
+MEAN_DILATATION = 'give the material volumetric="mean_dilatation"'
 # Elements that are over-constrained by one dilatation per cell.
 SIMPLICES = ("tri3", "tet4")
 
@@ -154,8 +158,7 @@ def _alternating_mean_stress(problem: Problem, state: State, step: StepResult) -
         return []
     return [
         f"{' and '.join(names)} cells lock: in a nearly incompressible material their mean stress scatters by "
-        f"{np.sqrt(difference / norm):.0%} about its averages at the nodes, and forces are too large; use quadrangles "
-        "or hexahedra, or quadratic elements (generate.to_quadratic)"
+        f"{np.sqrt(difference / norm):.0%} about its averages at the nodes, and forces are too large; {OTHER_ELEMENTS}"
     ]
 
 
@@ -172,8 +175,7 @@ def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[
         nu = _poisson_ratios(problem.model, problem.field)[0].max()
         return [
             f"{' and '.join(names)} cells lock: at nu = {nu:g} their mean stress scatters by {pressure:.0%} about its "
-            "averages at the nodes, and contact pressures with it; use quadrangles or hexahedra, or quadratic elements "
-            "(generate.to_quadratic)"
+            f"averages at the nodes, and contact pressures with it; {OTHER_ELEMENTS}"
         ]
     if energy > BENDING and not axisymmetric:  # stresses at the axis scatter in any case
         projected = any(elements.get(name).dilatation is not None for name in names)
@@ -193,8 +195,8 @@ EXCESS, ITERATIONS = 0.05, 5
 AT_NODES = ("tri3", "tet4", "wedge6", "pyramid5")
 
 
-class Comparison:
-    """The forces S u of the excess stiffness, see the docstring of the module.
+class ExcessStiffness:
+    """The stiffness S of locking elements in excess of the reference, see the docstring of the module.
 
     Parameters
     ----------
@@ -253,53 +255,39 @@ class Comparison:
             excess[name][..., :3] += deviation[:, None, None]
 
 
-def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> float:
+def relative_excess(problem: Problem, u: Array, excess: ExcessStiffness) -> float:
     """Return D over the elastic energy of displacements u (n_dofs,) [length], see the docstring of the module [-]."""
-    system, n = problem.system, problem.model.n_dofs
+    system, n, zero = problem.system, problem.model.n_dofs, np.zeros(len(u))
 
-    def excess(displacement: Array) -> Array:
+    def excess_force(displacement: Array) -> Array:
         force = np.zeros(len(u))
-        force[:n] = comparison.force(problem.displacement(displacement)).ravel()
+        force[:n] = excess.force(problem.displacement(displacement)).ravel()
         return force
 
-    energy = 0.5 * float(u @ (system.K @ u))
-    excess_force = excess(u)
-    lower = 0.5 * float(u @ excess_force)
-    zero, zero_lift = np.zeros(len(u)), np.zeros(len(u))
-    residual = system.reduced(excess_force)
-    direction, last_slope, snapshot = zero, 0.0, problem.solver.snapshot()
-    for _ in range(ITERATIONS):
-        step = problem.solver.load(residual).full_solution(zero)
-        slope = float(residual @ step)
-        if not slope > ROUND_OFF * energy:
-            break
-        direction = step + (slope / last_slope if last_slope else 0.0) * direction
-        displacement_of_direction = system.displacement(direction, zero_lift)
-        product = system.reduced(system.K @ displacement_of_direction - excess(displacement_of_direction))
-        curvature = float(direction @ product)
-        if not curvature > 0.0:
-            break
-        lower += 0.5 * slope**2 / curvature
-        residual = residual - slope / curvature * product
-        last_slope = slope
+    def reference_force(v: Array) -> Array:
+        displacement = system.displacement(v, zero)
+        return system.reduced(system.K @ displacement - excess_force(displacement))
+
+    def preconditioned(residual: Array) -> Array:
+        return problem.solver.load(residual).full_solution(zero)
+
+    energy, force, snapshot = 0.5 * float(u @ (system.K @ u)), excess_force(u), problem.solver.snapshot()
+    right_side, shape = system.reduced(force), (len(u), len(u))
+    operator, preconditioner = LinearOperator(shape, reference_force), LinearOperator(shape, preconditioned)
+    x, _ = cg(operator, right_side, rtol=ROUND_OFF, maxiter=ITERATIONS, M=preconditioner)
     problem.solver.put_back(snapshot)  # discards these loads, which do not belong to the analysis
-    return lower / energy if energy > 0.0 else 0.0
+    # For iterates x of conjugate gradients from zero, the maximised expression is x.S u / 2.
+    return 0.5 * float(u @ force + x @ right_side) / energy if energy > 0.0 else 0.0
 
 
 def locking_warning(problem: Problem, u: Array) -> list[str]:
     """Return a warning where nearly incompressible elements are too stiff in the displacements u (n_dofs,)."""
-    comparison = Comparison(problem.model)
-    if not comparison.elements:
+    excess = ExcessStiffness(problem.model)
+    ratio = relative_excess(problem, u, excess) if excess.elements else 0.0
+    if ratio <= EXCESS:
         return []
-    excess = excess_of_stiffness(problem, u, comparison)
-    if excess <= EXCESS:
-        return []
-    names = " and ".join(comparison.elements)
-    if set(comparison.elements) <= set(AT_NODES):
-        remedy = "use quadrangles or hexahedra, or quadratic elements (generate.to_quadratic)"
-    else:
-        remedy = 'give the material volumetric="mean_dilatation"'
+    names, simple = " and ".join(excess.elements), set(excess.elements) <= set(AT_NODES)
     return [
-        f"{names} cells lock: at nu = {comparison.nu:g}, nearly incompressible, they make the model about "
-        f"{excess:.0%} too stiff (elastic energy under the same forces); {remedy}"
+        f"{names} cells lock: at nu = {excess.nu:g}, nearly incompressible, they make the model about {ratio:.0%} too stiff "
+        f"(elastic energy under the same forces); {OTHER_ELEMENTS if simple else MEAN_DILATATION}"
     ]

@@ -589,13 +589,14 @@ def _alternation_matrix(side: Surface) -> csr_array:
 
     On quadratic facets they alternate between corners and other nodes, and on linear ones between any two.
     """
+    adjacency = side.node_adjacency
     if side.order == 1:
-        return side.node_adjacency
+        return csr_array(adjacency - diags_array(adjacency.diagonal()))
     is_corner = np.zeros(len(side.points))
     for block in side.blocks:
         is_corner[block.local[:, : elements.get(block.element).n_corners]] = 1.0
     corners, others = diags_array(is_corner), diags_array(1.0 - is_corner)
-    return csr_array(corners @ side.node_adjacency @ others + others @ side.node_adjacency @ corners)
+    return csr_array(corners @ adjacency @ others + others @ adjacency @ corners)
 
 
 def _neglected_rotation(

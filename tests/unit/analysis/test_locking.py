@@ -9,7 +9,7 @@ from models import made_of, supported, united
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
-from fastcontact.analysis.locking import SUSPICIOUS, Comparison, locking_warning
+from fastcontact.analysis.locking import SUSPICIOUS, ExcessStiffness, locking_warning
 from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.mesh import elements
@@ -79,7 +79,7 @@ def test_elements_without_remedy_are_told_with_a_figure_of_the_right_size(name, 
 def test_no_word_where_nothing_locks(name):
     assert np.isnan(solved(clamped(name, 0.3, "plain"))[1])
     assert np.isnan(solved(clamped(name, 0.499, "plain", "plane_stress"))[1])
-    assert Comparison(clamped(name, SUSPICIOUS - 0.01)).elements == []
+    assert ExcessStiffness(clamped(name, SUSPICIOUS - 0.01)).elements == []
 
 
 @pytest.mark.parametrize(
@@ -172,8 +172,8 @@ def test_a_released_part_is_not_judged_by_its_residual_stress(n):
 @pytest.mark.parametrize("name", ["quad4", "tri3", "tri6"])
 def test_the_surplus_is_a_stiffness(name, kinematics):
     model = clamped(name, 0.499, "plain", kinematics, n=2)
-    comparison, shape = Comparison(model), model.mesh.points.shape
-    S = np.column_stack([comparison.force(unit.reshape(shape)).ravel() for unit in np.eye(model.n_dofs)])
+    excess, shape = ExcessStiffness(model), model.mesh.points.shape
+    S = np.column_stack([excess.force(unit.reshape(shape)).ravel() for unit in np.eye(model.n_dofs)])
     assert np.abs(S - S.T).max() < 1e-12 * np.abs(S).max()
     assert np.linalg.eigvalsh(S).min() > -1e-12 * np.abs(S).max()
     if name == "quad4":  # what the averaged element does not have
@@ -184,7 +184,7 @@ def test_the_surplus_is_a_stiffness(name, kinematics):
 
 
 @pytest.mark.parametrize("linear_solver", ["direct", "amg"])
-def test_the_comparison_leaves_nothing_behind_in_the_solver(linear_solver):
+def test_the_excess_leaves_nothing_behind_in_the_solver(linear_solver):
     problem = prepare(clamped("quad4", 0.499, "plain"), fc.linear_ramp(1), fc.Criteria(), linear_solver=linear_solver)
     state, _ = load_step(problem, problem.initial_state(), 1, 1.0)
     before = repr(problem.solver.snapshot())
