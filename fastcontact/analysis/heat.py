@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ ByRamp = Mapping[Table | None, Array]
 
 @dataclass(frozen=True, eq=False)
 class Temperatures:
-    """Steady temperatures.
+    """Steady temperatures and heat flows.
 
     Attributes
     ----------
@@ -36,11 +36,14 @@ class Temperatures:
         Heat flow into the nodes with prescribed temperatures [power].
     balance : dict
         See `StepResult.heat` [power].
+    fluxes : dict of str to ndarray (m,)
+        Heat flux at the secondary nodes of each contact pair that conducts heat [power / area].
     """
 
     rise: Array
     reaction: Array
     balance: dict[str, Any]
+    fluxes: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

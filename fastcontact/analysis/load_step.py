@@ -20,17 +20,18 @@ from fastcontact._tools.argument_types import unchecked
 from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.resultants import reference_reactions
 from fastcontact.analysis.state import State
 from fastcontact.analysis.thermal_coupling import (
-    HeatSolution,
     expansion_as_force,
     first_rise,
     settle_heat,
     thermal_load,
+    with_heat_results,
 )
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
@@ -76,18 +77,18 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     context = prepare_start(problem, state, index, load)
-    heat_solution, solution = None, newton(context, load)
+    temperatures, solution = None, newton(context, load)
     if problem.heat is not None:
-        heat_solution, solution = settle_heat(
+        temperatures, solution = settle_heat(
             problem, context.state, load_without_conduction, instant, rise, solution, partial(newton, context)
         )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
-    return _end_of_step(problem, context.state, load, solution, iterations, (index, instant), heat_solution)
+    return _end_of_step(problem, context.state, load, solution, iterations, (index, instant), temperatures)
 
 
 def _end_of_step(
     problem: Problem, start: State, load: StepLoad, solution: StepEquilibrium, iterations: dict[str, Any],
-    number_and_instant: tuple[int, float], heat_solution: HeatSolution | None,
+    number_and_instant: tuple[int, float], temperatures: Temperatures | None,
 ) -> tuple[State, StepResult]:  # fmt: skip
     """Return the state and the result at the end of a load step.
 
@@ -103,13 +104,13 @@ def _end_of_step(
         Numbers of iterations, for `StepResult.iterations`; it is modified.
     number_and_instant : (int, float)
         Number of the step, and pseudo-time at its end.
-    heat_solution : HeatSolution, optional
+    temperatures : Temperatures, optional
         The converged temperatures, in models with conduction of heat.
     """
     settled, u, balance = solution.settled, solution.u, solution.balance
     end = replace(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        instant=number_and_instant[1], rise=None if heat_solution is None else heat_solution.rise,
+        instant=number_and_instant[1], rise=None if temperatures is None else temperatures.rise,
     )  # fmt: skip
     bodies = None
     if problem.bodies is not None and solution.terms is not None:
@@ -146,7 +147,7 @@ def _end_of_step(
             iterations["regularised"] |= moved
     end = replace(end, solver=problem.solver.snapshot())
     result = recover(problem, end, contact, balance.reaction, iterations, number_and_instant, bodies)
-    return end, result if heat_solution is None else heat_solution.with_heat_results(problem, result)
+    return end, result if temperatures is None else with_heat_results(problem, temperatures, result)
 
 
 def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> StepContext:

@@ -73,14 +73,14 @@ def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Seq
     model, field, mesh = problem.model, problem.field, problem.model.mesh
     thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
     offset = model.stress_offset(thermal, initial, field, step.temperature)
-    if not names or offset is not None:  # free thermal expansion only causes round-off stresses
+    if not names or (offset is not None and problem.bodies is None):  # free expansion only causes round-off stresses
         return 0.0, 0.0
     stress: CellStress | PointStress
     plastic_work, largest_work = 0.0, state.work.largest if state.work else 0.0
     if problem.bodies is None:
         stress = CellStress(mesh, model.kinematics, field.moduli, step.displacement, field.treatment)
     else:
-        deformed = problem.deformed(state.u, state, None, tangent=False)
+        deformed = problem.deformed(state.u, state, model.expanding_rise(thermal, step.temperature), tangent=False)
         stress, plastic_work = PointStress(deformed.stress), deformed.plastic_work
     recovered = smoothed_stress(mesh, field, stress)
     sums = np.sum([_scatter_integrals(problem, stress, name, recovered[name]) for name in names], axis=0)
@@ -95,7 +95,7 @@ def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Seq
     if not plastic_work:  # a thin part may bend on a body that stores more energy
         notable = sums[sums[:, 1] > NOTABLE_ENERGY * energy**2]
         ratio = float(np.sqrt(notable[:, 0] / notable[:, 1]).max(initial=ratio))
-    return ratio, float(mean_difference / mean) if mean > 0.0 else 0.0
+    return ratio if offset is None else 0.0, float(mean_difference / mean) if mean > 0.0 else 0.0
 
 
 def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name: str, recovered: Array) -> Array:
@@ -104,14 +104,15 @@ def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name:
     xi, weights = integration_rule(element, 2)
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     body, n = bodies(mesh)[1], len(mesh.cells[name])
-    averaged = _poisson_ratios(problem.model, field)[1] & (element.n_corners == element.dim + 1)
+    nearly_incompressible = field.averaged if problem.bodies else _poisson_ratios(problem.model, field)[1]
+    selected = nearly_incompressible & (name in SIMPLICES)
     sums = np.zeros((body.max() + 1, 4))
     for rows in np.array_split(np.arange(n), n * dN.nbytes // BATCH + 1):
         cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
         computed = stress.at(name, xi, cells, field.moduli_rows[name][rows], rows)
         difference = N @ recovered[rows] - computed
         volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
-        compliance, mean_weights = field.compliance[numbers][:, None], volume * averaged[numbers, None]
+        compliance, mean_weights = field.compliance[numbers][:, None], volume * selected[numbers, None]
         integrals = [
             *(elastic_energy(values, compliance) * volume for values in (difference, computed)),
             *(values[..., :3].mean(axis=2) ** 2 * mean_weights for values in (difference, computed)),
@@ -132,52 +133,30 @@ def _poisson_ratios(model: Model, field: MaterialField) -> tuple[Array, Mask]:
 
 def locking_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
     """Return a warning where cells are too stiff, because they lock or bend."""
-    if problem.bodies is None:
-        volumetric = locking_warning(problem, state.u)
-    else:
-        volumetric = _alternating_mean_stress(problem, state, step)
+    volumetric = locking_warning(problem, state.u) if problem.bodies is None else []
     return volumetric or _scatter_warnings(problem, state, step)
-
-
-def _alternating_mean_stress(problem: Problem, state: State, step: StepResult) -> list[str]:
-    """Return a warning where the mean stress of nearly incompressible nonlinear triangles and tetrahedra alternates."""
-    mesh = problem.model.mesh
-    names = [name for name in SIMPLICES if name in mesh.solids]
-    selected = problem.field.averaged & (problem.model.kinematics != "plane_stress")
-    if not names or not selected.any():
-        return []
-    rise = problem.model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
-    stress, difference, norm = problem.deformed(state.u, state, rise, tangent=False).stress, 0.0, 0.0
-    for name in names:
-        rows = selected[problem.field.rows[name]]
-        cells, mean = mesh.cells[name][rows], stress[name][rows][..., :3].mean(axis=(1, 2))
-        total, count = (np.bincount(cells.ravel(), w, mesh.n_points) for w in (mean.repeat(cells.shape[1]), None))
-        smooth = (total / np.maximum(count, 1))[cells].mean(axis=1)
-        difference, norm = difference + float(((mean - smooth) ** 2).sum()), norm + float((mean**2).sum())
-    if difference <= ALTERNATING**2 * norm:
-        return []
-    return [
-        f"{' and '.join(names)} cells lock: in a nearly incompressible material their mean stress scatters by "
-        f"{np.sqrt(difference / norm):.0%} about its averages at the nodes, and forces are too large; {OTHER_ELEMENTS}"
-    ]
 
 
 def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
     """Return a warning where the stresses of linear cells differ much from recovered ones."""
-    linear, axisymmetric = problem.bodies is None, problem.model.kinematics == "axisymmetric"
-    if axisymmetric and not linear:
-        return []
-    have_modes = all(material.incompatible_modes for material, _ in problem.model.materials)
+    model, linear = problem.model, problem.bodies is None
+    have_modes = all(material.incompatible_modes for material, _ in model.materials)
     bending = BENDING_ELEMENTS if have_modes else ()
-    names = [name for name in problem.model.mesh.solids if elements.get(name).order == 1 and name not in bending]
-    energy, pressure = _stress_scatter(problem, state, step, names)
-    if pressure > ALTERNATING and linear:
-        nu = _poisson_ratios(problem.model, problem.field)[0].max()
+    names = [name for name in model.mesh.solids if elements.get(name).order == 1 and name not in bending]
+    energy, mean_stress = _stress_scatter(problem, state, step, names)
+    if mean_stress > ALTERNATING:
+        simplices = " and ".join(name for name in names if name in SIMPLICES)
+        material, effect = "in a nearly incompressible material", "forces are too large"
+        if linear:
+            material, effect = (
+                f"at nu = {_poisson_ratios(model, problem.field)[0].max():g}",
+                "contact pressures with it",
+            )
         return [
-            f"{' and '.join(names)} cells lock: at nu = {nu:g} their mean stress scatters by {pressure:.0%} about its "
-            f"averages at the nodes, and contact pressures with it; {OTHER_ELEMENTS}"
+            f"{simplices} cells lock: {material} their mean stress scatters by {mean_stress:.0%} about its averages at the "
+            f"nodes, and {effect}; {OTHER_ELEMENTS}"
         ]
-    if energy > BENDING and not axisymmetric:  # stresses at the axis scatter in any case
+    if energy > BENDING and model.kinematics != "axisymmetric":  # stresses at the axis scatter in any case
         projected = any(elements.get(name).dilatation is not None for name in names)
         soft = " or, with their mean dilatation, too soft" if projected and problem.field.averaged.any() else ""
         modes = "hexahedra or quadrangles with LinearElastic(incompatible_modes=True), " if linear else ""

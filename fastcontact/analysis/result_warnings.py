@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
+from scipy.sparse.csgraph import dijkstra
 
 from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.facet_sag import facet_length, sag_warnings
@@ -135,10 +136,10 @@ def _sliding_past_ends(pair: Formulation, contact: ContactResult) -> Iterator[st
         direction = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), TINY)
         slip = contact.slip_total[first] * contact.active[first, None]
         distance = max(distance, largest((slip * direction).sum(axis=1)))
-    share, is_dual = distance / facet_length(pair.secondary, pair.points), getattr(pair, "multipliers", "") == "dual"
-    if share > (SLIDE_PAST_ENDS_DUAL if is_dual else SLIDE_PAST_ENDS):
+    ratio, is_dual = distance / facet_length(pair.secondary, pair.points), getattr(pair, "multipliers", "") == "dual"
+    if ratio > (SLIDE_PAST_ENDS_DUAL if is_dual else SLIDE_PAST_ENDS):
         yield (
-            f"contact '{contact.name}': its sides slide by {distance:.3g}, or {share:.1%} of a facet, past each other at the "
+            f"contact '{contact.name}': its sides slide by {distance:.3g}, or {ratio:.1%} of a facet, past each other at the "
             "periodic ends, beyond which there are no opposite facets: pressures of the nodes at the ends may be wrong. "
             "The default formulation is little affected; without sliding at the ends, or without ends, there is no error"
         )
@@ -214,10 +215,10 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
     """
     work = state.work
     if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
-        share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
+        fraction = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         hint = "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
         yield (
-            f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
+            f"{fraction:.0%} of the work of friction is done at nodes in the load step in which they "
             "close, or contact is lost, where the slip is that of the complete step, not only that in contact: the work of "
             f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{hint}"
         )
@@ -465,18 +466,11 @@ def facets_across_radius(side: Surface, closed: Mask, excluded: Mask) -> int | N
     closed, excluded : ndarray of bool (m,)
         Nodes of the side in contact; nodes excluded by the user, which do not form an edge.
     """
-    reached = ~closed & ~excluded
-    if not reached.any():
+    edge = np.flatnonzero(~closed & ~excluded)
+    if not len(edge):
         return None
-    count = 0
-    while not reached[closed].all():
-        wider = reached.copy()
-        for block in side.blocks:
-            wider[block.local[reached[block.local].any(axis=1)]] = True
-        if (wider == reached).all():  # the rest of the contact is closed from end to end
-            return None
-        reached, count = wider, count + 1
-    return count
+    distance = dijkstra(side.node_adjacency, indices=edge, unweighted=True, min_only=True)[closed].max(initial=0.0)
+    return int(distance) if np.isfinite(distance) else None  # infinite where contact is closed from end to end
 
 
 def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model) -> Iterator[str]:
@@ -536,8 +530,8 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
             return f"exchange the sides, since the body of '{primary.group}' is softer"
     if pair.name != "mortar":
         return "use formulation mortar"
-    beside = [name for name, block in model.mesh.solids.items() if np.isin(block, side.points).any()]
-    if any(name[:3] not in ("qua", "hex") for name in beside):
+    adjacent = [name for name, block in model.mesh.solids.items() if np.isin(block, side.points).any()]
+    if any(name[:3] not in ("qua", "hex") for name in adjacent):
         return f"use quadrangles or hexahedra along '{group}', or triangles or tetrahedra there about as deep as wide"
     if not isinstance(primary, Surface):
         return f"use smaller facets of '{group}'"
@@ -554,8 +548,8 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
 def _modulus(model: Model, points: NDArray[np.integer]) -> float:
     """Return the mean contact modulus of the cells at `points` [pressure]."""
     solids = model.mesh.solids
-    beside = [moduli[np.isin(solids[name], points).any(axis=1)] for name, moduli in model.contact_moduli().items()]
-    return float(np.concatenate(beside).mean())
+    moduli = [values[np.isin(solids[name], points).any(axis=1)] for name, values in model.contact_moduli().items()]
+    return float(np.concatenate(moduli).mean())
 
 
 def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -> Iterator[str]:
@@ -611,10 +605,10 @@ def _neglected_rotation(
     worst = int(np.argmax(ratio))
     if ratio[worst] > NEGLECTED:
         name = body_name(mesh, bodies(mesh)[1], worst)
-        share = f"{ratio[worst]:.0%} of their work on" if ratio[worst] <= 1.0 else "more work than on"
+        comparison = f"{ratio[worst]:.0%} of their work on" if ratio[worst] <= 1.0 else "more work than on"
         yield (
             f"rotations of up to {angle:.2g} rad matter in body {name}: on the strains that linear kinematics neglect its "
-            f"stresses would do {share} strains. Solve the model with strain='finite'"
+            f"stresses would do {comparison} strains. Solve the model with strain='finite'"
         )
         return
     capacity = _frictional_capacity(problem, last)
@@ -672,15 +666,15 @@ def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
         for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
             slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
             stress, volume = N @ last.stress[cells], np.abs(volume) * weights
-            tensor = stress[..., PAIRS[mesh.dim]]
-            strain_work = np.einsum("cqij,cqij->cq", tensor, slope)
+            stress_tensor = stress[..., PAIRS[mesh.dim]]
+            strain_work = np.einsum("cqij,cqij->cq", stress_tensor, slope)
             if axisymmetric:
                 radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
                 volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_u / radius
             rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
             # The neglected strain is 0.5 W.T @ W = -0.5 W @ W, since the rotation W is antisymmetric.
-            neglected_work = -0.5 * np.einsum("cqij,cqij->cq", tensor, rotation @ rotation)
-            size, rotated = (np.linalg.norm(part, axis=(2, 3)) for part in (slope - rotation, rotation))
+            neglected_work = -0.5 * np.einsum("cqij,cqij->cq", stress_tensor, rotation @ rotation)
+            size, rotated = (np.linalg.norm(tensor, axis=(2, 3)) for tensor in (slope - rotation, rotation))
             neglected_work[size < SINGLE_PRECISION * rotated] = 0.0  # stresses of a rigid-body motion are round-off
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
             np.add.at(work_by_body, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))

@@ -198,12 +198,10 @@ contact_answers = contact_resultants
 
 def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactResultants:
     closed, facing = contact.active, np.isfinite(contact.gap)
-    normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
-    normal_forces = np.einsum("nd,nd->n", contact.force_vectors, normal)
-    total, area = float(normal_forces.sum()), float(areas[closed].sum())
+    total, area = contact.normal_force, float(areas[closed].sum())
     in_compression, x = bool(total > 0.0), contact.positions
     moment = contact_moment(contact)
-    centre = normal_forces @ x / total if in_compression else np.full(x.shape[1], np.nan)
+    centre = contact.normal_forces @ x / total if in_compression else np.full(x.shape[1], np.nan)
     if axisymmetric:
         centre[0] = np.nan
     return ContactResultants(
@@ -211,7 +209,7 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
         moment=np.zeros_like(moment) if axisymmetric else moment,
         area=area,
         centre=centre,
-        normal_force=contact.normal_force,
+        normal_force=total,
         mean_gap=float(areas[facing] @ contact.gap[facing] / areas[facing].sum()) if facing.any() else float("nan"),
         pressure_mean=total / area if area else 0.0,
         pressure_max=contact.pressure_max,

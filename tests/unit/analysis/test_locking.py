@@ -183,6 +183,19 @@ def test_the_surplus_is_a_stiffness(name, kinematics):
         assert np.abs(S - (K - averaged).toarray()).max() < 1e-10 * np.abs(S).max()
 
 
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_an_alternating_mean_stress_is_reported_where_the_excess_of_stiffness_is_small():
+    model = fc.Model(fc.generate.half_spheres(size=6.0), "plane_strain")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.46))
+    supported(model, A1A2="x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=2.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    texts = [text for text in fc.solve(model, 1)[-1].warnings if "cells lock" in text]
+    assert len(texts) == 1
+    assert texts[0].startswith("tri3 cells lock: at nu = 0.46 their mean stress scatters by 49% about its averages at the nodes")
+
+
 @pytest.mark.parametrize("linear_solver", ["direct", "amg"])
 def test_the_excess_leaves_nothing_behind_in_the_solver(linear_solver):
     problem = prepare(clamped("quad4", 0.499, "plain"), fc.linear_ramp(1), fc.Criteria(), linear_solver=linear_solver)
