@@ -12,9 +12,9 @@ from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
-from fastcontact.analysis.modal.cyclic import Sectors, Wave, pairs_of, without_ends
-from fastcontact.analysis.modal.eigenpairs import Reduced, lowest
-from fastcontact.analysis.modal.held_contact import Conditions, held_contact, joined
+from fastcontact.analysis.modal.cyclic import Sectors, Wave, complex_eigenpairs, open_sector
+from fastcontact.analysis.modal.eigenpairs import Reduced, lowest_eigenpairs
+from fastcontact.analysis.modal.held_contact import Conditions, assembled, held_contact
 from fastcontact.analysis.modal.shapes import Modes
 from fastcontact.analysis.problem import near_nullspace
 from fastcontact.analysis.stages import stage_of
@@ -160,7 +160,7 @@ class _Vibration:
         field = model.material_field()
         K, M = _stiffness(model, stressed, field, density), mass(model.mesh, model.kinematics, density)
         supported, _ = model.prescribed_by_ramp()
-        model = without_ends(model, sectors)
+        model = open_sector(model, sectors)
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
         contact = held_contact(model, step, held, hold_sliding)
         slides = step is not None and any((pair.active & ~pair.sticking).any() for pair in step.contact.values())
@@ -192,24 +192,24 @@ class _Vibration:
         # Pretension sections keep their current length.
         locked_lengths = [MultiPointConstraint(bolt.name, bolt.row(model.n_dofs)) for bolt in model.pretensions]
         relations = driven.relations(wave.relations(model, [*model.relations, *locked_lengths]))
-        K, M = wave.real_blocks(self.K), wave.real_blocks(driven.stiffness(self.M))
+        K, M = wave.real_block_form(self.K), wave.real_block_form(driven.stiffness(self.M))
         nullspace = driven.near_nullspace(near_nullspace(model))
-        nullspace = nullspace if wave.single else np.asarray(np.kron(np.eye(2), nullspace), float)
-        contact = joined(map(wave.on_ring, self.contact), K.shape[0])
+        nullspace = nullspace if wave.is_standing else np.asarray(np.kron(np.eye(2), nullspace), float)
+        contact = assembled(map(wave.ring_conditions, self.contact), K.shape[0])
         K = contact.stiffened(K)
         in_conditions = np.isin(np.arange(K.shape[0]), contact.rows.indices)
         without_stiffness = wave.repeated(driven.without_stiffness) & in_conditions
         system = System(K, wave.repeated(driven.supported(self.supported).ravel()), relations, without_stiffness)
         reduced = Reduced(system, M, contact.rows, contact.nodes)
-        count, n_free = n if wave.single else 2 * n, int(reduced.free.sum())
+        count, n_free = n if wave.is_standing else 2 * n, int(reduced.free.sum())
         if count >= n_free:
             raise ModelError(f"n = {count} modes of {n_free} free displacements: request fewer")
         solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], needs_columns=True)
         solver.contrast = self.field.contrast
         free_nullspace = np.where(reduced.free[:, None], nullspace, 0.0)
-        values, v = lowest(solver, (reduced.K, reduced.M), free_nullspace, reduced.free, count, self.shift)
+        values, v = lowest_eigenpairs(solver, (reduced.K, reduced.M), free_nullspace, reduced.free, count, self.shift)
         vectors = reduced.displacement(v)
-        return (values, vectors) if wave.single else pairs_of(vectors, K, M, n)
+        return (values, vectors) if wave.is_standing else complex_eigenpairs(vectors, K, M, n)
 
 
 def _stiffness(model: Model, step: StepResult | None, field: MaterialField, density: Densities) -> bsr_array:
@@ -269,13 +269,13 @@ def _modes(
     shapes, participation, diameters, twins = [], [], [], []
     for wave, eigenvalues, displacements in eigenpairs:
         vectors = displacements[:n_dofs]  # without those of obstacles
-        vectors = (_with_positive_peak(vectors) if wave.single else np.sqrt(2.0) * vectors) / np.sqrt(number)
+        vectors = (_with_positive_peak(vectors) if wave.is_standing else np.sqrt(2.0) * vectors) / np.sqrt(number)
         phases = np.exp(1j * wave.angle * np.arange(number))
         ring_momentum = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, rotations)
         for value, vector, momentum_of_mode in zip(eigenvalues.tolist(), vectors.T, ring_momentum, strict=True):
             first = len(values)
-            twins += [first] if wave.single else [first + 1, first]
-            for component in (np.real,) if wave.single else (np.real, np.imag):
+            twins += [first] if wave.is_standing else [first + 1, first]
+            for component in (np.real,) if wave.is_standing else (np.real, np.imag):
                 values.append(value)
                 diameters.append(wave.diameters)
                 shapes.append(component(vector).reshape(-1, dim))

@@ -75,7 +75,7 @@ class HeldContact:
         return K
 
 
-def joined(all_conditions: Iterable[Conditions], n_dofs: int) -> HeldContact:
+def assembled(all_conditions: Iterable[Conditions], n_dofs: int) -> HeldContact:
     """Return all conditions together, for `n_dofs` displacements."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
     for conditions in all_conditions:

@@ -193,7 +193,9 @@ def test_an_alternating_mean_stress_is_reported_where_the_excess_of_stiffness_is
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")
     texts = [text for text in fc.solve(model, 1)[-1].warnings if "cells lock" in text]
     assert len(texts) == 1
-    assert texts[0].startswith("tri3 cells lock: at nu = 0.46 their mean stress scatters by 49% about its averages at the nodes")
+    assert texts[0].startswith(
+        "tri3 cells lock: at nu = 0.46 their mean stress scatters by 49% about its averages at the nodes"
+    )
 
 
 @pytest.mark.parametrize("linear_solver", ["direct", "amg"])
