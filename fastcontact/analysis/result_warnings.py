@@ -53,7 +53,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 # - the wear depth, relative to the size of the model;
 # - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield;
 # - the length of the facets of one side, relative to that of the other side.
-NEGLECTED = 0.1
+WARNING_RATIO = 0.1
 # Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
 # bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.
 OUT_OF_BALANCE = 0.03
@@ -181,7 +181,7 @@ def _unstable_wear(name: str, pair: Formulation, state: State) -> Iterator[str]:
     if name not in state.worn or (factor := stability_ratio(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
-    if factor > LARGEST_STEP_FACTOR or depth > NEGLECTED * size:
+    if factor > LARGEST_STEP_FACTOR or depth > WARNING_RATIO * size:
         yield (
             f"contact '{name}' has a wear depth of {depth:.3g}, {depth / size:.2g} times the size of the model, and load "
             f"steps that are {factor:.2g} times too large for this wear: is the option 'wear' Archard's coefficient divided "
@@ -214,7 +214,7 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
     in large steps, and 1e-5 if slip is measured from first contact.
     """
     work = state.work
-    if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
+    if work is not None and work.touching > max(WARNING_RATIO * work.friction, NOTABLE**2 * work.largest, 0.0):
         fraction = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         hint = "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
         yield (
@@ -308,9 +308,9 @@ def _undetermined_positions(last: StepResult, free_bodies: FreeBodies | None) ->
 def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     """Yield warnings where strains, or plastic strains, are too large for linear kinematics."""
     strain = largest_strain(problem.model, last)
-    if strain > NEGLECTED:
+    if strain > WARNING_RATIO:
         yield (
-            f"the largest equivalent strain is {strain:.3f}, beyond the {NEGLECTED} up to which linear kinematics are "
+            f"the largest equivalent strain is {strain:.3f}, beyond the {WARNING_RATIO} up to which linear kinematics are "
             "accurate"
         )
     else:
@@ -344,16 +344,16 @@ def _large_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     moduli = np.eye(problem.field.moduli.shape[1])[None]  # unit moduli: stresses are strains
     rows = {name: np.zeros(len(block), np.int32) for name, block in model.mesh.solids.items()}
     strain = float(np.abs(recovery.nodal_stress(model.mesh, model.kinematics, moduli, rows, last.displacement)).max())
-    if strain > NEGLECTED:
+    if strain > WARNING_RATIO:
         yield (
-            f"temperatures and initial states cause strains of {strain:.3g}, beyond the {NEGLECTED} up to which linear "
+            f"temperatures and initial states cause strains of {strain:.3g}, beyond the {WARNING_RATIO} up to which linear "
             "kinematics are accurate: are they in the units of the model?"
         )
 
 
 def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterator[str]:
     angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
-    if angle**2 > NEGLECTED:  # the change of area that linear kinematics neglect
+    if angle**2 > WARNING_RATIO:  # the change of area that linear kinematics neglect
         yield (
             f"the largest rotation is {angle:.3f} rad, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
@@ -365,7 +365,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
     ratio = np.abs(neglected) / np.maximum(work_by_body, least_work)
     # Even small rotations matter under large stresses. In bodies whose stresses are only due to neglected strains, the works
     # on strains and on neglected strains are about equal.
-    is_preloaded = bool(((ratio > NEGLECTED) & (ratio < 0.5)).any())
+    is_preloaded = bool(((ratio > WARNING_RATIO) & (ratio < 0.5)).any())
     friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
     if angle > 0.5 * OUT_OF_BALANCE * friction or is_preloaded:
         yield from _neglected_rotation(problem, last, angle, neglected, ratio)
@@ -536,7 +536,7 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
     if not isinstance(primary, Surface):
         return f"use smaller facets of '{group}'"
     length, opposite = (facet_length(surface, pair.points) for surface in (side, primary))
-    if length > (1.0 + NEGLECTED) * opposite:
+    if length > (1.0 + WARNING_RATIO) * opposite:
         return f"use facets of '{group}' that are at most as large as the opposite ones"
     if side.order == 2 and pair.points.shape[1] == 2 and getattr(pair, "multipliers", "") == "dual":
         # Errors of pressures on a heated shrink fit were 0.11 to 0.17, and with standard multipliers at most 0.002. At sharp
@@ -568,7 +568,7 @@ def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: Contact
     inside = contact.active & ~near_open
     means = (side.extended_adjacency[inside] @ (weight * contact.pressure)) / (side.extended_adjacency[inside] @ weight)
     mean, peak = float(means.max(initial=0.0)), contact.pressure.argmax()
-    if (side.extended_adjacency @ near_open)[peak] and contact.pressure_max > (1.0 + NEGLECTED) * mean > 0.0:
+    if (side.extended_adjacency @ near_open)[peak] and contact.pressure_max > (1.0 + WARNING_RATIO) * mean > 0.0:
         remedy = ", or formulation mortar" if pair.name != "mortar" and not isinstance(pair.primary, Surface) else ""
         yield (
             f"contact '{contact.name}': the largest nodal pressure, {contact.pressure_max:.4g}, is within four facets of "
@@ -603,7 +603,7 @@ def _neglected_rotation(
     """
     mesh = problem.model.mesh
     worst = int(np.argmax(ratio))
-    if ratio[worst] > NEGLECTED:
+    if ratio[worst] > WARNING_RATIO:
         name = body_name(mesh, bodies(mesh)[1], worst)
         comparison = f"{ratio[worst]:.0%} of their work on" if ratio[worst] <= 1.0 else "more work than on"
         yield (

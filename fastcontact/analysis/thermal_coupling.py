@@ -36,12 +36,12 @@ Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
 def with_heat_results(problem: Problem, temperatures: Temperatures, step: StepResult) -> StepResult:
     """Return the result of a load step with heat fluxes and heat reactions added."""
     assert problem.heat is not None
-    flux = problem.heat.conduction_at(step.displacement).flux(temperatures.rise)
-    with_flux = {name: replace(step.contact[name], heat_flux=power) for name, power in temperatures.fluxes.items()}
+    cell_flux = problem.heat.conduction_at(step.displacement).flux(temperatures.rise)
+    with_flux = {name: replace(step.contact[name], heat_flux=flux) for name, flux in temperatures.fluxes.items()}
     return replace(
         step, contact=step.contact | with_flux, heat_reaction=temperatures.reaction,
         iterations={**step.iterations, "heat": temperatures.balance},
-        cell_fields={**step.cell_fields, **dict(zip(HEAT_FLUX, flux.T, strict=False))},
+        cell_fields={**step.cell_fields, **dict(zip(HEAT_FLUX, cell_flux.T, strict=False))},
     )  # fmt: skip
 
 
@@ -158,10 +158,11 @@ def _steady_temperatures(
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
-    powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in conducting.items()}
-    fluxes = {name: conducting[name][1].side_pressure(power) / conducting[name][4] for name, power in powers.items()}
-    balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
-    return replace(steady, balance=balance, fluxes=fluxes)
+    fluxes, heat_flows = {}, {}
+    for name, (link, field, h, obstacle_rise, area_ratio) in conducting.items():
+        power = h * link.area * (link.jump @ steady.rise - obstacle_rise)
+        fluxes[name], heat_flows[name] = field.side_pressure(power) / area_ratio, float(power.sum())
+    return replace(steady, balance={**steady.balance, "contacts": heat_flows}, fluxes=fluxes)
 
 
 def _normal_state(
