@@ -431,7 +431,7 @@ def reference_reactions(
 def _at_supports(
     model: Model, relations: Sequence[MultiPointConstraint], supported: Mask, reaction: Array, u: Array
 ) -> tuple[Array, list[Array]]:
-    """Return the nodal forces (n_points, dim) of supports alone, and the forces of constraints, `relations` first [force].
+    """Return the nodal forces (n_points, dim) of supports, and the Lagrange multipliers of each of the `relations` [force].
 
     `reaction` and the displacements `u` [length] have the shape (n_points, dim) or (n_dofs,).
     """
