@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import bmat, bsr_array, coo_array, csr_array
+from scipy.sparse import bmat, bsr_array, csr_array, eye_array, vstack
 
 from fastcontact.analysis.modal.held_contact import Conditions
 from fastcontact.arrays import AnyArray, Array, Indices
@@ -146,30 +146,25 @@ class Wave:
 
     def _combination_matrix(self, conditions: Conditions) -> tuple[csr_array, Indices]:
         """Return the matrix (k, q) that maps conditions to those of the ring, and the main condition (k,) of each."""
-        nodes = conditions.nodes
-        is_single, blocks = np.ones(len(nodes), bool), []
+        nodes, identity = conditions.nodes, eye_array(len(conditions.nodes), dtype=complex, format="csr")
+        rows, main_conditions, is_single = [], [], np.ones(len(nodes), bool)
         for interface in self.sectors.periodic_interfaces:
             on_interface = np.flatnonzero(np.isin(nodes, interface.first) | np.isin(nodes, interface.second))
             for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
                 first, second = (on_interface[nodes[on_interface] == node] for node in (a, b))
                 if a == b and len(first):
-                    blocks.append((self._combinations_at_axis(conditions, first), first, first))
-                    is_single[first] = False
+                    members, block = first, self._combinations_at_axis(conditions, first)
                 elif len(first) and len(second):
+                    members = np.concatenate([first, second])
                     block = self._combinations_across(conditions, interface, first, second)
-                    blocks.append((block, first, np.concatenate([first, second])))
-                    is_single[first] = is_single[second] = False
+                else:
+                    continue
+                rows.append(csr_array(block) @ identity[members])
+                main_conditions.append(first[: len(block)])
+                is_single[members] = False
         single = np.flatnonzero(is_single)
-        rows, columns, values = [np.arange(len(single))], [single], [np.ones(len(single), complex)]
-        main_conditions, count = [single], len(single)
-        for block, main, members in blocks:
-            rows.append(np.repeat(count + np.arange(len(block)), len(members)))
-            columns.append(np.tile(members, len(block)))
-            values.append(block.ravel())
-            main_conditions.append(main[: len(block)])
-            count += len(block)
-        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return csr_array(coo_array(entries, shape=(count, len(nodes)))), np.concatenate(main_conditions)
+        matrix = csr_array(vstack([identity[single], *rows], format="csr"))
+        return matrix, np.concatenate([single, *main_conditions])
 
     def _combinations_across(
         self, conditions: Conditions, interface: PeriodicInterface, at_first: Indices, at_second: Indices
