@@ -185,9 +185,7 @@ def _covered(pair: Formulation, step: StepResult, name: str) -> Array | float:
     """Return the fraction (n_nodes,) of the tributary areas that has an opposite side; 1 against obstacles [-]."""
     if isinstance(pair.primary, RigidSide):
         return 1.0
-    field = pair.unilateral(end_of(None, step, name)).nodal
-    assert field is not None
-    return field.covered
+    return pair.unilateral(end_of(None, step, name)).nodal_field.covered
 
 
 #: The earlier name of `ContactResultants`.

@@ -136,7 +136,6 @@ def _steady_temperatures(
         rows, solution = settled.constraints.rows[name], settled.solution
         configuration = problem.configuration(name, start, load, displacement, u)
         constraints, force, gap = _normal_state(problem, settled, name, rows, configuration)
-        assert constraints.nodal is not None
         link = heat_transfer(constraints, pair.secondary, pair.primary, pair.points.shape)
         area_ratio = np.ones(n)  # ratio of deformed to undeformed area at each node
         if heat.finite_strain:
@@ -153,7 +152,7 @@ def _steady_temperatures(
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
                 obstacles = csr_array(obstacles + link.matrix(h))
                 obstacle_power = obstacle_power + link.secondary.T @ (h * link.area * obstacle_rise)
-            conducting[name] = link, constraints.nodal, h, obstacle_rise, area_ratio[pair.secondary.points]
+            conducting[name] = link, constraints.nodal_field, h, obstacle_rise, area_ratio[pair.secondary.points]
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))

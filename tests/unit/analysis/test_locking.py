@@ -199,7 +199,7 @@ def test_an_alternating_mean_stress_is_reported_where_the_excess_of_stiffness_is
 
 
 @pytest.mark.parametrize("linear_solver", ["direct", "amg"])
-def test_the_excess_leaves_nothing_behind_in_the_solver(linear_solver):
+def test_the_comparison_leaves_nothing_behind_in_the_solver(linear_solver):
     problem = prepare(clamped("quad4", 0.499, "plain"), fc.linear_ramp(1), fc.Criteria(), linear_solver=linear_solver)
     state, _ = load_step(problem, problem.initial_state(), 1, 1.0)
     before = repr(problem.solver.snapshot())
