@@ -182,13 +182,11 @@ def _tangential_results(
     shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
     sticking, pressure = solution.sticking[rows], constraints.pressure(multiplier)
     if len(sticking) != len(pressure):  # a node sticks if most of its pressure is due to sticking constraints
-        assert constraints.nodal is not None
-        sticking = constraints.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
+        sticking = constraints.nodal_field.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
     elif not constraints.usable.all():
         # A mid-side node without a multiplier sticks if all corners whose forces contribute to its pressure stick.
-        assert constraints.nodal is not None
         forces = np.abs(multiplier)
-        total, sliding = map(constraints.nodal.pressure, (forces, np.where(sticking, 0.0, forces)))
+        total, sliding = map(constraints.nodal_field.pressure, (forces, np.where(sticking, 0.0, forces)))
         sticking = np.where(constraints.usable, sticking, (total > 0.0) & (sliding <= SUM_ROUND_OFF * total))
     return shear * scale[:, None], sticking, tangential
 
@@ -212,8 +210,7 @@ def _closed_nodes(
         well; zero at open nodes. If the formulation has negative pressures anywhere, the ratio is at most 1, since its
         pressure at a node may then nearly vanish [-].
     """
-    field, excluded = constraints.nodal, pair.excluded[pair.secondary.points]
-    assert field is not None
+    field, excluded = constraints.nodal_field, pair.excluded[pair.secondary.points]
     forces = constraints.normal_forces(constraints.contact_forces(multiplier))
     side_pressure, covered = field.side_pressure(forces), field.covered
     if pair.options.kind in ALWAYS_CLOSED:
@@ -254,8 +251,7 @@ def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask,
     side : Surface
         The secondary side.
     """
-    field, may_pull = constraints.nodal, bool(constraints.equality.any())
-    assert field is not None
+    field, may_pull = constraints.nodal_field, bool(constraints.equality.any())
     nodal_pressure, shares, areas = field.side_pressure(forces), field.nodal_forces(forces), field.nodal_areas
     with_area = areas > NEGLIGIBLE_AREA * np.abs(areas).mean()  # nodes that may receive shares of others
     while True:
@@ -304,12 +300,10 @@ def _nodal_shear(
     Because tangents vary from point to point, the traction is computed from Cartesian components of the `tangential` and
     `normal_forces` of the constraints. Its component along the nodal normals is then removed.
     """
-    field = constraints.nodal
-    assert field is not None
     forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
     if normal_forces is not None:
         forces += normal_forces[:, None] * normals(directions)
-    traction = field.traction(forces)
+    traction = constraints.nodal_field.traction(forces)
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
@@ -320,8 +314,7 @@ def _within_cone(constraints: Constraints, shear: Array, pressure: Array, normal
     constraints differ from those of the nodes. As in `closed_node_pressures`, the excess over the limit is moved to the
     nearest nodes that can carry it, which preserves the resultant.
     """
-    assert constraints.nodal is not None
-    areas, limit = constraints.nodal.nodal_areas, constraints.friction.max() * np.maximum(pressure, 0.0)
+    areas, limit = constraints.nodal_field.nodal_areas, constraints.friction.max() * np.maximum(pressure, 0.0)
     receivers = (limit > 0.0) & (areas > NEGLIGIBLE_AREA * np.abs(areas).mean())
     while True:
         size = np.linalg.norm(shear, axis=1)
@@ -341,11 +334,10 @@ def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows:
     For parameters see `contact_result`.
     """
     assert solution.slip_before_closing is not None
-    assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))
-    pressure, mean = constraints.nodal.side_pressure(forces)[:, None], np.zeros_like(result.coordinates)
-    np.divide(constraints.nodal.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
+    pressure, mean = constraints.nodal_field.side_pressure(forces)[:, None], np.zeros_like(result.coordinates)
+    np.divide(constraints.nodal_field.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
     # The nodal values of a field may exceed the values from which it is computed.
     largest, length = np.linalg.norm(slips, axis=1).max(initial=0.0), np.linalg.norm(mean, axis=1)
     return mean * np.divide(largest, length, out=np.ones_like(length), where=length > largest)[:, None]

@@ -80,8 +80,8 @@ def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> 
     To hold the bodies, the friction `coefficients` would have to be `factor` times as large.
     """
     distinct = np.unique(coefficients[coefficients > 0.0])
-    compared = (factor, 1.0), (factor * distinct[0], distinct[0])
-    digits = next((n for n in range(3, 12) if all(f"{a:.{n}g}" != f"{b:.{n}g}" for a, b in compared)), 12)
+    numbers = (factor, 1.0), (factor * distinct[0], distinct[0])  # which the message must distinguish
+    digits = next((n for n in range(3, 12) if all(f"{a:.{n}g}" != f"{b:.{n}g}" for a, b in numbers)), 12)
     needed = (
         f"a coefficient of about {factor * distinct[0]:.{digits}g} where the largest is {distinct[0]:.{digits}g}"
         if np.isclose(distinct[0], distinct[-1])

@@ -88,13 +88,13 @@ def _inclination(pair: Formulation, configuration: Configuration, contact: Conta
     along = contact.shear / np.maximum(traction, TINY)[:, None]
     inclination = ((contact.normal - smooth) * along).sum(axis=1)
     error, total = abs(float(force @ inclination)), float(force.sum())
-    share = error / max(pair.friction * total, TINY)
-    if share <= RELATIVE_ERROR_LIMIT[1] or error <= NOTABLE * total:
+    fraction = error / max(pair.friction * total, TINY)
+    if fraction <= RELATIVE_ERROR_LIMIT[1] or error <= NOTABLE * total:
         return ""
     return (
         f"facets of the primary side are inclined to the smooth surface, by {np.abs(inclination).max():.2g} rad along the "
-        f"friction, which changes tangential forces by about {share:.0%} of the friction limit: use the default formulation, "
-        "surface_smoothing=True, or smaller facets"
+        f"friction, which changes tangential forces by about {fraction:.0%} of the friction limit: use the default "
+        "formulation, surface_smoothing=True, or smaller facets"
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ ByRamp = Mapping[Table | None, Array]
 
 @dataclass(frozen=True, eq=False)
 class Temperatures:
-    """Steady temperatures.
+    """Steady temperatures and heat flows.
 
     Attributes
     ----------
@@ -36,11 +36,14 @@ class Temperatures:
         Heat flow into the nodes with prescribed temperatures [power].
     balance : dict
         See `StepResult.heat` [power].
+    fluxes : dict of str to ndarray (m,)
+        Heat flux at the secondary nodes of each contact pair that conducts heat [power / area].
     """
 
     rise: Array
     reaction: Array
     balance: dict[str, Any]
+    fluxes: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,12 +203,13 @@ class Heat:
         """Raise a ConvergenceError if the temperature of a body is undetermined."""
         determined = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)
-        joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
-        cut_off = undetermined_bodies(self.body, determined, joined)
-        if len(cut_off):
+        conducting = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
+        isolated = undetermined_bodies(self.body, determined, conducting)
+        if len(isolated):
             raise ConvergenceError(
-                f"no heat reaches body {body_name(self.model.mesh, self.body, cut_off[0])}: its contacts are open or conduct "
-                "nothing in this step, so that nothing determines its temperature; add a film, or a conductance across gaps"
+                f"no heat reaches body {body_name(self.model.mesh, self.body, isolated[0])}: its contacts are open or "
+                "conduct nothing in this step, so that nothing determines its temperature; add a film, or a conductance "
+                "across gaps"
             )
 
 

@@ -46,7 +46,7 @@ def interpenetration(problem: Problem, last: StepResult, peaks: Sequence[Peak]) 
     warnings: list[str] = []
     for index, u, contact in ((last.index, last.displacement, last.contact), *peaks):
         overlaps = list(depths(mesh, problem.model.kinematics, mesh.points + u))
-        texts = _beside_contact(problem, u, contact, pairs_between, overlaps) + _through_obstacles(problem, u, contact)
+        texts = _outside_groups(problem, u, contact, pairs_between, overlaps) + _through_obstacles(problem, u, contact)
         if index != last.index:
             warnings += [f"in load step {index}, where its force is largest, {text}" for text in texts]
             continue
@@ -87,7 +87,7 @@ def _without_contact(problem: Problem, pairs_between: PairsBetween, overlaps: Se
     return list(texts.values())
 
 
-def _beside_contact(
+def _outside_groups(
     problem: Problem, displacement: Array, contact: Contacts, pairs_between: PairsBetween,
     overlaps: Sequence[Overlap],
 ) -> list[str]:  # fmt: skip

@@ -21,6 +21,7 @@ from fastcontact.analysis import thermal_coupling
 from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
@@ -79,7 +80,7 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     if temperatures is None:
         return _end_of_step(step, solution, instant, None, iterations)
     end, result = _end_of_step(step, solution, instant, temperatures.rise, iterations)
-    return end, temperatures.with_heat_results(problem, result)
+    return end, thermal_coupling.with_heat_results(problem, temperatures, result)
 
 
 def _end_of_step(

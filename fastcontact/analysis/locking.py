@@ -5,9 +5,9 @@ Meth. Engng 24, 1987). In nearly incompressible cells only the mean stress is us
 stress, and with it the contact pressure, alternates from cell to cell (Hughes, The finite element method, 1987, section
 4.3.7).
 
-`Comparison` measures volumetric locking by a lower bound of the excess stiffness. Let K be the stiffness of the model, K - S
-that of a reference without locking, and S the excess. For the forces of the solution u, the potential energy of the reference
-is lower than that of the model by
+`relative_excess` measures volumetric locking by a lower bound of the excess stiffness. Let K be the stiffness of the model,
+K - S that of a reference without locking, and S the excess. For the forces of the solution u, the potential energy of the
+reference is lower than that of the model by
 
     D = u.S u / 2 + max over x of (x.S u - x.(K - S) x / 2),
 
@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, cg
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
@@ -52,6 +53,9 @@ SUSPICIOUS, ALTERNATING = 0.45, 0.25
 BENDING = 0.45
 # Fraction of the elastic energy of all bodies above which the error of a single body is examined.
 NOTABLE_ENERGY = 0.1
+# Remedies for elements that lock with any kind of integration, and for other elements.
+OTHER_ELEMENTS = "use quadrangles or hexahedra, or quadratic elements (generate.to_quadratic)"
+MEAN_DILATATION = 'give the material volumetric="mean_dilatation"'
 # Elements that are over-constrained by one dilatation per cell.
 SIMPLICES = ("tri3", "tet4")
 
@@ -69,14 +73,14 @@ def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Seq
     model, field, mesh = problem.model, problem.field, problem.model.mesh
     thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
     offset = model.stress_offset(thermal, initial, field, step.temperature)
-    if not names or offset is not None:  # free thermal expansion only causes round-off stresses
+    if not names or (offset is not None and problem.bodies is None):  # free expansion only causes round-off stresses
         return 0.0, 0.0
     stress: CellStress | PointStress
     plastic_work, largest_work = 0.0, state.work.largest if state.work else 0.0
     if problem.bodies is None:
         stress = CellStress(mesh, model.kinematics, field.moduli, step.displacement, field.treatment)
     else:
-        deformed = problem.deformed(state.u, state, None, tangent=False)
+        deformed = problem.deformed(state.u, state, model.expanding_rise(thermal, step.temperature), tangent=False)
         stress, plastic_work = PointStress(deformed.stress), deformed.plastic_work
     recovered = smoothed_stress(mesh, field, stress)
     sums = np.sum([_scatter_integrals(problem, stress, name, recovered[name]) for name in names], axis=0)
@@ -91,7 +95,7 @@ def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Seq
     if not plastic_work:  # a thin part may bend on a body that stores more energy
         notable = sums[sums[:, 1] > NOTABLE_ENERGY * energy**2]
         ratio = float(np.sqrt(notable[:, 0] / notable[:, 1]).max(initial=ratio))
-    return ratio, float(mean_difference / mean) if mean > 0.0 else 0.0
+    return ratio if offset is None else 0.0, float(mean_difference / mean) if mean > 0.0 else 0.0
 
 
 def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name: str, recovered: Array) -> Array:
@@ -100,14 +104,15 @@ def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name:
     xi, weights = integration_rule(element, 2)
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     body, n = bodies(mesh)[1], len(mesh.cells[name])
-    averaged = _poisson_ratios(problem.model, field)[1] & (element.n_corners == element.dim + 1)
+    nearly_incompressible = field.averaged if problem.bodies else _poisson_ratios(problem.model, field)[1]
+    selected = nearly_incompressible & (name in SIMPLICES)
     sums = np.zeros((body.max() + 1, 4))
     for rows in np.array_split(np.arange(n), n * dN.nbytes // BATCH + 1):
         cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
         computed = stress.at(name, xi, cells, field.moduli_rows[name][rows], rows)
         difference = N @ recovered[rows] - computed
         volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
-        compliance, mean_weights = field.compliance[numbers][:, None], volume * averaged[numbers, None]
+        compliance, mean_weights = field.compliance[numbers][:, None], volume * selected[numbers, None]
         integrals = [
             *(elastic_energy(values, compliance) * volume for values in (difference, computed)),
             *(values[..., :3].mean(axis=2) ** 2 * mean_weights for values in (difference, computed)),
@@ -128,54 +133,30 @@ def _poisson_ratios(model: Model, field: MaterialField) -> tuple[Array, Mask]:
 
 def locking_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
     """Return a warning where cells are too stiff, because they lock or bend."""
-    if problem.bodies is None:
-        volumetric = locking_warning(problem, state.u)
-    else:
-        volumetric = _alternating_mean_stress(problem, state, step)
+    volumetric = locking_warning(problem, state.u) if problem.bodies is None else []
     return volumetric or _scatter_warnings(problem, state, step)
-
-
-def _alternating_mean_stress(problem: Problem, state: State, step: StepResult) -> list[str]:
-    """Return a warning where the mean stress of nearly incompressible nonlinear triangles and tetrahedra alternates."""
-    mesh = problem.model.mesh
-    names = [name for name in SIMPLICES if name in mesh.solids]
-    selected = problem.field.averaged & (problem.model.kinematics != "plane_stress")
-    if not names or not selected.any():
-        return []
-    rise = problem.model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
-    stress, difference, norm = problem.deformed(state.u, state, rise, tangent=False).stress, 0.0, 0.0
-    for name in names:
-        rows = selected[problem.field.rows[name]]
-        cells, mean = mesh.cells[name][rows], stress[name][rows][..., :3].mean(axis=(1, 2))
-        total, count = (np.bincount(cells.ravel(), w, mesh.n_points) for w in (mean.repeat(cells.shape[1]), None))
-        smooth = (total / np.maximum(count, 1))[cells].mean(axis=1)
-        difference, norm = difference + float(((mean - smooth) ** 2).sum()), norm + float((mean**2).sum())
-    if difference <= ALTERNATING**2 * norm:
-        return []
-    return [
-        f"{' and '.join(names)} cells lock: in a nearly incompressible material their mean stress scatters by "
-        f"{np.sqrt(difference / norm):.0%} about its averages at the nodes, and forces are too large; use quadrangles "
-        "or hexahedra, or quadratic elements (generate.to_quadratic)"
-    ]
 
 
 def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
     """Return a warning where the stresses of linear cells differ much from recovered ones."""
-    linear, axisymmetric = problem.bodies is None, problem.model.kinematics == "axisymmetric"
-    if axisymmetric and not linear:
-        return []
-    have_modes = all(material.incompatible_modes for material, _ in problem.model.materials)
+    model, linear = problem.model, problem.bodies is None
+    have_modes = all(material.incompatible_modes for material, _ in model.materials)
     bending = BENDING_ELEMENTS if have_modes else ()
-    names = [name for name in problem.model.mesh.solids if elements.get(name).order == 1 and name not in bending]
-    energy, pressure = _stress_scatter(problem, state, step, names)
-    if pressure > ALTERNATING and linear:
-        nu = _poisson_ratios(problem.model, problem.field)[0].max()
+    names = [name for name in model.mesh.solids if elements.get(name).order == 1 and name not in bending]
+    energy, mean_stress = _stress_scatter(problem, state, step, names)
+    if mean_stress > ALTERNATING:
+        simplices = " and ".join(name for name in names if name in SIMPLICES)
+        material, effect = "in a nearly incompressible material", "forces are too large"
+        if linear:
+            material, effect = (
+                f"at nu = {_poisson_ratios(model, problem.field)[0].max():g}",
+                "contact pressures with it",
+            )
         return [
-            f"{' and '.join(names)} cells lock: at nu = {nu:g} their mean stress scatters by {pressure:.0%} about its "
-            "averages at the nodes, and contact pressures with it; use quadrangles or hexahedra, or quadratic elements "
-            "(generate.to_quadratic)"
+            f"{simplices} cells lock: {material} their mean stress scatters by {mean_stress:.0%} about its averages at the "
+            f"nodes, and {effect}; {OTHER_ELEMENTS}"
         ]
-    if energy > BENDING and not axisymmetric:  # stresses at the axis scatter in any case
+    if energy > BENDING and model.kinematics != "axisymmetric":  # stresses at the axis scatter in any case
         projected = any(elements.get(name).dilatation is not None for name in names)
         soft = " or, with their mean dilatation, too soft" if projected and problem.field.averaged.any() else ""
         modes = "hexahedra or quadrangles with LinearElastic(incompatible_modes=True), " if linear else ""
@@ -193,8 +174,8 @@ EXCESS, ITERATIONS = 0.05, 5
 AT_NODES = ("tri3", "tet4", "wedge6", "pyramid5")
 
 
-class Comparison:
-    """The forces S u of the excess stiffness, see the docstring of the module.
+class ExcessStiffness:
+    """The stiffness S of locking elements in excess of the reference, see the docstring of the module.
 
     Parameters
     ----------
@@ -253,53 +234,39 @@ class Comparison:
             excess[name][..., :3] += deviation[:, None, None]
 
 
-def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> float:
+def relative_excess(problem: Problem, u: Array, excess: ExcessStiffness) -> float:
     """Return D over the elastic energy of displacements u (n_dofs,) [length], see the docstring of the module [-]."""
-    system, n = problem.system, problem.model.n_dofs
+    system, n, zero = problem.system, problem.model.n_dofs, np.zeros(len(u))
 
-    def excess(displacement: Array) -> Array:
+    def excess_force(displacement: Array) -> Array:
         force = np.zeros(len(u))
-        force[:n] = comparison.force(problem.displacement(displacement)).ravel()
+        force[:n] = excess.force(problem.displacement(displacement)).ravel()
         return force
 
-    energy = 0.5 * float(u @ (system.K @ u))
-    excess_force = excess(u)
-    lower = 0.5 * float(u @ excess_force)
-    zero, zero_lift = np.zeros(len(u)), np.zeros(len(u))
-    residual = system.reduced(excess_force)
-    direction, last_slope, snapshot = zero, 0.0, problem.solver.snapshot()
-    for _ in range(ITERATIONS):
-        step = problem.solver.load(residual).full_solution(zero)
-        slope = float(residual @ step)
-        if not slope > ROUND_OFF * energy:
-            break
-        direction = step + (slope / last_slope if last_slope else 0.0) * direction
-        displacement_of_direction = system.displacement(direction, zero_lift)
-        product = system.reduced(system.K @ displacement_of_direction - excess(displacement_of_direction))
-        curvature = float(direction @ product)
-        if not curvature > 0.0:
-            break
-        lower += 0.5 * slope**2 / curvature
-        residual = residual - slope / curvature * product
-        last_slope = slope
+    def reference_force(v: Array) -> Array:
+        displacement = system.displacement(v, zero)
+        return system.reduced(system.K @ displacement - excess_force(displacement))
+
+    def preconditioned(residual: Array) -> Array:
+        return problem.solver.load(residual).full_solution(zero)
+
+    energy, force, snapshot = 0.5 * float(u @ (system.K @ u)), excess_force(u), problem.solver.snapshot()
+    right_side, shape = system.reduced(force), (len(u), len(u))
+    operator, preconditioner = LinearOperator(shape, reference_force), LinearOperator(shape, preconditioned)
+    x, _ = cg(operator, right_side, rtol=ROUND_OFF, maxiter=ITERATIONS, M=preconditioner)
     problem.solver.put_back(snapshot)  # discards these loads, which do not belong to the analysis
-    return lower / energy if energy > 0.0 else 0.0
+    # For iterates x of conjugate gradients from zero, the maximised expression is x.S u / 2.
+    return 0.5 * float(u @ force + x @ right_side) / energy if energy > 0.0 else 0.0
 
 
 def locking_warning(problem: Problem, u: Array) -> list[str]:
     """Return a warning where nearly incompressible elements are too stiff in the displacements u (n_dofs,)."""
-    comparison = Comparison(problem.model)
-    if not comparison.elements:
+    excess = ExcessStiffness(problem.model)
+    ratio = relative_excess(problem, u, excess) if excess.elements else 0.0
+    if ratio <= EXCESS:
         return []
-    excess = excess_of_stiffness(problem, u, comparison)
-    if excess <= EXCESS:
-        return []
-    names = " and ".join(comparison.elements)
-    if set(comparison.elements) <= set(AT_NODES):
-        remedy = "use quadrangles or hexahedra, or quadratic elements (generate.to_quadratic)"
-    else:
-        remedy = 'give the material volumetric="mean_dilatation"'
+    names, simple = " and ".join(excess.elements), set(excess.elements) <= set(AT_NODES)
     return [
-        f"{names} cells lock: at nu = {comparison.nu:g}, nearly incompressible, they make the model about "
-        f"{excess:.0%} too stiff (elastic energy under the same forces); {remedy}"
+        f"{names} cells lock: at nu = {excess.nu:g}, nearly incompressible, they make the model about {ratio:.0%} too stiff "
+        f"(elastic energy under the same forces); {OTHER_ELEMENTS if simple else MEAN_DILATATION}"
     ]

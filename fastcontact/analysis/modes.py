@@ -12,9 +12,9 @@ from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
-from fastcontact.analysis.modal.cyclic import Sectors, Wave, pairs_of, without_ends
-from fastcontact.analysis.modal.eigenpairs import Reduced, lowest
-from fastcontact.analysis.modal.held_contact import Conditions, held_contact, joined
+from fastcontact.analysis.modal.cyclic import Sectors, Wave, complex_eigenpairs, open_sector
+from fastcontact.analysis.modal.eigenpairs import Reduced, lowest_eigenpairs
+from fastcontact.analysis.modal.held_contact import Conditions, assembled, held_contact
 from fastcontact.analysis.modal.shapes import Modes
 from fastcontact.analysis.problem import near_nullspace
 from fastcontact.analysis.stages import stage_of
@@ -109,29 +109,26 @@ def modes(
     sectors = Sectors.of(model)
     diameters = _diameters(model, sectors, nodal_diameters)
     vibration = _Vibration.of(model, sectors, step if stress_stiffening else None, step, hold_sliding)
-    if sectors is None or diameters is None:
-        values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
-        vibration.warn_of_sliding_modes(values, vectors)
-        result = _modes(vibration, values, vectors)
-    else:
-        waves = [Wave(sectors, d) for d in diameters]
-        pairs = [(wave, *vibration.wave_eigenpairs(wave, n, linear_solver)) for wave in waves]
-        result = _ring_modes(vibration, sectors, pairs)
+    waves = [Wave(sectors, d) for d in ([0] if diameters is None else diameters)]
+    eigenpairs = [(wave, *vibration.eigenpairs(wave, n, linear_solver)) for wave in waves]
+    if diameters is None:
+        vibration.warn_of_sliding_modes(*eigenpairs[0][1:])
+    result = _modes(vibration, sectors, eigenpairs, whole_ring=diameters is not None)
     if result.unstable.any():
         warn(f"{result.remarks()[0]}: the loads exceed a buckling load, or nodes slide (hold_sliding=True)")
     return result
 
 
-def _diameters(model: Model, sectors: Sectors | None, requested: int | str | Sequence[int] | None) -> list[int] | None:
+def _diameters(model: Model, sectors: Sectors, requested: int | str | Sequence[int] | None) -> list[int] | None:
     """Return the requested nodal diameters; None by default. ModelError if the model is not a sector of a ring."""
     if requested is None:
-        if sectors is not None:
+        if sectors.number > 1:
             warn(
                 f"only modes with 0 nodal diameters are computed, which are alike in all {sectors.number} sectors: request "
                 'all modes of the ring with nodal_diameters="all"'
             )
         return None
-    if sectors is None:
+    if sectors.number == 1:
         raise ModelError("nodal diameters need a sector of a ring: name its ends by Model.add_cyclic_symmetry")
     if model.force_driven.pairs:
         raise ModelError(
@@ -156,14 +153,14 @@ class _Vibration:
 
     @classmethod
     def of(
-        cls, model: Model, sectors: Sectors | None, stressed: StepResult | None, step: StepResult | None, hold_sliding: bool
-    ) -> _Vibration:  # fmt: skip
+        cls, model: Model, sectors: Sectors, stressed: StepResult | None, step: StepResult | None, hold_sliding: bool
+    ) -> _Vibration:
         """Return the vibration about a step, open at the ends of sectors; the stresses of `stressed` add stiffness."""
         density = Densities([material for material, _ in model.materials], model.material_of_cells())
         field = model.material_field()
         K, M = _stiffness(model, stressed, field, density), mass(model.mesh, model.kinematics, density)
         supported, _ = model.prescribed_by_ramp()
-        model = model if sectors is None else without_ends(model, sectors)
+        model = open_sector(model, sectors)
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
         contact = held_contact(model, step, held, hold_sliding)
         slides = step is not None and any((pair.active & ~pair.sticking).any() for pair in step.contact.values())
@@ -189,39 +186,30 @@ class _Vibration:
                 "does in small motions"
             )
 
-    def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
-        """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n); for a wave, those of its real form."""
+    def eigenpairs(self, wave: Wave, n: int, linear_solver: str) -> tuple[Array, AnyArray]:
+        """Return the n lowest eigenvalues (n,) and the displacements (n_dofs, n) of a wave, real for standing waves."""
         model, driven = self.model, self.model.force_driven
         # Pretension sections keep their current length.
         locked_lengths = [MultiPointConstraint(bolt.name, bolt.row(model.n_dofs)) for bolt in model.pretensions]
-        relations = [*model.relations, *locked_lengths]
-        K, M, nullspace = self.K, driven.stiffness(self.M), driven.near_nullspace(near_nullspace(model))
-        supported, without_stiffness = driven.supported(self.supported).ravel(), driven.without_stiffness
-        if wave is not None:
-            K, M, relations = wave.real_blocks(K), wave.real_blocks(M), wave.relations(model, relations)
-            supported, without_stiffness = wave.repeated(supported), wave.repeated(without_stiffness)
-            nullspace = nullspace if wave.single else np.asarray(np.kron(np.eye(2), nullspace), float)
-        relations = driven.relations(relations)
-        contact = joined(self.contact, K.shape[0]) if wave is None else joined(self.contact, K.shape[0], wave.on_ring)
+        relations = driven.relations(wave.relations(model, [*model.relations, *locked_lengths]))
+        K, M = wave.real_block_form(self.K), wave.real_block_form(driven.stiffness(self.M))
+        nullspace = driven.near_nullspace(near_nullspace(model))
+        nullspace = nullspace if wave.is_standing else np.asarray(np.kron(np.eye(2), nullspace), float)
+        contact = assembled(map(wave.ring_conditions, self.contact), K.shape[0])
         K = contact.stiffened(K)
         in_conditions = np.isin(np.arange(K.shape[0]), contact.rows.indices)
-        system = System(K, supported, relations, without_stiffness & in_conditions)
+        without_stiffness = wave.repeated(driven.without_stiffness) & in_conditions
+        system = System(K, wave.repeated(driven.supported(self.supported).ravel()), relations, without_stiffness)
         reduced = Reduced(system, M, contact.rows, contact.nodes)
-        if n >= int(reduced.free.sum()):
-            raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: request fewer")
+        count, n_free = n if wave.is_standing else 2 * n, int(reduced.free.sum())
+        if count >= n_free:
+            raise ModelError(f"n = {count} modes of {n_free} free displacements: request fewer")
         solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], needs_columns=True)
         solver.contrast = self.field.contrast
         free_nullspace = np.where(reduced.free[:, None], nullspace, 0.0)
-        values, vectors = lowest(solver, (reduced.K, reduced.M), free_nullspace, reduced.free, n, self.shift)
-        return values, reduced.displacement(vectors)
-
-    def wave_eigenpairs(self, wave: Wave, n: int, linear_solver: str) -> tuple[Array, AnyArray]:
-        """Return the n lowest eigenvalues (n,) and complex displacements (n_dofs, n) of a wave, of unit modal mass."""
-        values, vectors = self.lowest(n if wave.single else 2 * n, linear_solver, wave)
-        if wave.single:
-            return values, vectors
-        K = joined(self.contact, 2 * self.K.shape[0], wave.on_ring).stiffened(wave.real_blocks(self.K))
-        return pairs_of(vectors, K, wave.real_blocks(self.M), n)
+        values, v = lowest_eigenpairs(solver, (reduced.K, reduced.M), free_nullspace, reduced.free, count, self.shift)
+        vectors = reduced.displacement(v)
+        return (values, vectors) if wave.is_standing else complex_eigenpairs(vectors, K, M, n)
 
 
 def _stiffness(model: Model, step: StepResult | None, field: MaterialField, density: Densities) -> bsr_array:
@@ -267,41 +255,36 @@ def _uniform_quotient(model: Model, K: bsr_array, M: bsr_array) -> float:
     return min((quotient for quotient in quotients if quotient > 0.0), default=1.0)
 
 
-def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:
-    """Return modes from eigenvalues (n,) [1 / time^2] and displacements (n_dofs, n), their largest component positive."""
-    momentum = _momentum(vibration)
-    dim = momentum.shape[1]
-    vectors = _with_positive_peak(vectors[: len(momentum)])
-    mass = np.einsum("nii->i", momentum.reshape(-1, dim, dim))
-    return Modes(
-        _frequencies(values), values, vectors.T.reshape(len(values), -1, dim), vectors.T @ momentum, mass, vibration.model,
-        vibration.field,
-    )  # fmt: skip
+def _modes(
+    vibration: _Vibration, sectors: Sectors, eigenpairs: list[tuple[Wave, Array, AnyArray]], *, whole_ring: bool
+) -> Modes:
+    """Return modes from the eigenvalues (n,) [1 / time^2] and displacements (n_dofs, n) of each wave.
 
-
-def _ring_modes(vibration: _Vibration, sectors: Sectors, waves: list[tuple[Wave, Array, AnyArray]]) -> Modes:
-    """Return the modes of the whole ring from eigenvalues (n,) and displacements (n_dofs, n) of each wave."""
-    momentum, number = _momentum(vibration), sectors.number
+    They are those of the whole ring or of the modelled sector. The largest component of standing waves is positive.
+    """
+    momentum, number = _momentum(vibration), sectors.number if whole_ring else 1
+    n_dofs, dim = momentum.shape
     rotations = [np.linalg.matrix_power(sectors.turn, k) for k in range(number)]
     values: list[float] = []
     shapes, participation, diameters, twins = [], [], [], []
-    for wave, eigenvalues, vectors in waves:
-        vectors = (_with_positive_peak(vectors) if wave.single else np.sqrt(2.0) * vectors) / np.sqrt(number)
+    for wave, eigenvalues, displacements in eigenpairs:
+        vectors = displacements[:n_dofs]  # without those of obstacles
+        vectors = (_with_positive_peak(vectors) if wave.is_standing else np.sqrt(2.0) * vectors) / np.sqrt(number)
         phases = np.exp(1j * wave.angle * np.arange(number))
         ring_momentum = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, rotations)
         for value, vector, momentum_of_mode in zip(eigenvalues.tolist(), vectors.T, ring_momentum, strict=True):
             first = len(values)
-            twins += [first] if wave.single else [first + 1, first]
-            for component in (np.real,) if wave.single else (np.real, np.imag):
+            twins += [first] if wave.is_standing else [first + 1, first]
+            for component in (np.real,) if wave.is_standing else (np.real, np.imag):
                 values.append(value)
                 diameters.append(wave.diameters)
-                shapes.append(component(vector).reshape(-1, momentum.shape[1]))
+                shapes.append(component(vector).reshape(-1, dim))
                 participation.append(component(momentum_of_mode))
-    mass = number * np.einsum("nii->i", momentum.reshape(-1, momentum.shape[1], momentum.shape[1]))
-    eigenvalues = np.array(values)
+    mass = number * np.einsum("nii->i", momentum.reshape(-1, dim, dim))
+    eigenvalues, ring = np.array(values), (np.array(diameters), np.array(twins), sectors)
     return Modes(
         _frequencies(eigenvalues), eigenvalues, np.array(shapes), np.array(participation), mass, vibration.model,
-        vibration.field, np.array(diameters), np.array(twins), sectors,
+        vibration.field, *(ring if whole_ring else ()),
     )  # fmt: skip
 
 

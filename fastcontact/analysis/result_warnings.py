@@ -13,7 +13,8 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.csgraph import dijkstra
 
 from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.facet_sag import facet_length, sag_warnings
@@ -32,7 +33,6 @@ from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.mass import cell_portions
-from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.elasticity.recovery import BATCH
 from fastcontact.elasticity.stiffness import rigid_modes
@@ -42,6 +42,7 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.model import Model
 from fastcontact.model.rigid_motions import body_name
+from fastcontact.results.layout import cut_at_interfaces
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
@@ -52,7 +53,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 # - the wear depth, relative to the size of the model;
 # - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield;
 # - the length of the facets of one side, relative to that of the other side.
-NEGLECTED = 0.1
+WARNING_RATIO = 0.1
 # Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
 # bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.
 OUT_OF_BALANCE = 0.03
@@ -102,15 +103,14 @@ def result_warnings(
     rises = load.rise, state.rise  # by prescribed temperatures of nonlinear bodies, and by heat conduction
     loaded = any(values is not None and values.any() for values in (load.force, load.lift, *rises))
     sag = sag_warnings(problem, state, last)
-    clearances = _open_clearances(problem, state)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.kind == "gap_only":
             continue
-        without_force = [] if name in clearances else _open_contact(problem, name, last, name in state.touched, loaded)
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
         undetermined = _undetermined_tractions(pair, contact, pair.nodes_with_undetermined_traction(configuration))
-        warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
+        warnings += [*_deep_penetration(pair, contact, state.u), *_open_contact(problem, state, name, last, loaded)]
+        warnings += undetermined
         unresolved = list(_coarse_contact(pair, contact, state))
         if name in sag and not (unresolved and isinstance(pair.primary, RigidSide)):  # refinement also reduces the sag
             unresolved = [sag[name]]
@@ -136,10 +136,10 @@ def _sliding_past_ends(pair: Formulation, contact: ContactResult) -> Iterator[st
         direction = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), TINY)
         slip = contact.slip_total[first] * contact.active[first, None]
         distance = max(distance, largest((slip * direction).sum(axis=1)))
-    share, is_dual = distance / facet_length(pair.secondary, pair.points), getattr(pair, "multipliers", "") == "dual"
-    if share > (SLIDE_PAST_ENDS_DUAL if is_dual else SLIDE_PAST_ENDS):
+    ratio, is_dual = distance / facet_length(pair.secondary, pair.points), getattr(pair, "multipliers", "") == "dual"
+    if ratio > (SLIDE_PAST_ENDS_DUAL if is_dual else SLIDE_PAST_ENDS):
         yield (
-            f"contact '{contact.name}': its sides slide by {distance:.3g}, or {share:.1%} of a facet, past each other at the "
+            f"contact '{contact.name}': its sides slide by {distance:.3g}, or {ratio:.1%} of a facet, past each other at the "
             "periodic ends, beyond which there are no opposite facets: pressures of the nodes at the ends may be wrong. "
             "The default formulation is little affected; without sliding at the ends, or without ends, there is no error"
         )
@@ -181,7 +181,7 @@ def _unstable_wear(name: str, pair: Formulation, state: State) -> Iterator[str]:
     if name not in state.worn or (factor := stability_ratio(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
-    if factor > LARGEST_STEP_FACTOR or depth > NEGLECTED * size:
+    if factor > LARGEST_STEP_FACTOR or depth > WARNING_RATIO * size:
         yield (
             f"contact '{name}' has a wear depth of {depth:.3g}, {depth / size:.2g} times the size of the model, and load "
             f"steps that are {factor:.2g} times too large for this wear: is the option 'wear' Archard's coefficient divided "
@@ -214,11 +214,11 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
     in large steps, and 1e-5 if slip is measured from first contact.
     """
     work = state.work
-    if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
-        share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
+    if work is not None and work.touching > max(WARNING_RATIO * work.friction, NOTABLE**2 * work.largest, 0.0):
+        fraction = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         hint = "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
         yield (
-            f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
+            f"{fraction:.0%} of the work of friction is done at nodes in the load step in which they "
             "close, or contact is lost, where the slip is that of the complete step, not only that in contact: the work of "
             f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{hint}"
         )
@@ -306,25 +306,11 @@ def _undetermined_positions(last: StepResult, free_bodies: FreeBodies | None) ->
 
 
 def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
-    laws, field = [material for material, _ in problem.model.materials], problem.field
-    # Infinite except for homogeneous `LinearElastic` materials. Where it is infinite, strains are computed below.
-    moduli = (law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf for law in laws)
-    shear = np.array([*moduli])
-    strain, interface, interior = 0.0, last.material_stress, np.ones(len(last.stress), bool)
-    if interface is not None:
-        interior[interface.points] = False
-        strain = float((recovery.von_mises(interface.stress) / (3 * shear[interface.material])).max())
-    for name, block in problem.model.mesh.solids.items():
-        shear_of_cells = shear[field.material_numbers[name]]
-        at_nodes = last.von_mises[block] * interior[block] / (3 * shear_of_cells[:, None])
-        strain = max(strain, float(at_nodes.max(initial=0.0)))
-        others = np.flatnonzero(np.isinf(shear_of_cells))
-        mean = last.stress[block[others]].mean(axis=1)
-        strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
-        strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
-    if strain > NEGLECTED:
+    """Yield warnings where strains, or plastic strains, are too large for linear kinematics."""
+    strain = largest_strain(problem.model, last)
+    if strain > WARNING_RATIO:
         yield (
-            f"the largest equivalent strain is {strain:.3f}, beyond the {NEGLECTED} up to which linear kinematics are "
+            f"the largest equivalent strain is {strain:.3f}, beyond the {WARNING_RATIO} up to which linear kinematics are "
             "accurate"
         )
     else:
@@ -338,6 +324,18 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
         )
 
 
+def largest_strain(model: Model, step: StepResult) -> float:
+    """Return the largest equivalent elastic strain at the nodes of a model at the end of a step [-]."""
+    field, (mesh, _, stress) = model.material_field(), cut_at_interfaces(model.mesh, step)
+    largest_in_cells = 0.0
+    for name, block in mesh.solids.items():
+        compliance = field.compliance[field.rows[name]]
+        for nodes in block.T:
+            strain = recovery.equivalent_strain(np.einsum("cij,cj->ci", compliance, stress[nodes]))
+            largest_in_cells = max(largest_in_cells, float(strain.max(initial=0.0)))
+    return largest_in_cells
+
+
 def _large_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     """Yield a warning where temperatures or initial states cause large strains, which stresses need not show."""
     model = problem.model
@@ -346,34 +344,31 @@ def _large_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     moduli = np.eye(problem.field.moduli.shape[1])[None]  # unit moduli: stresses are strains
     rows = {name: np.zeros(len(block), np.int32) for name, block in model.mesh.solids.items()}
     strain = float(np.abs(recovery.nodal_stress(model.mesh, model.kinematics, moduli, rows, last.displacement)).max())
-    if strain > NEGLECTED:
+    if strain > WARNING_RATIO:
         yield (
-            f"temperatures and initial states cause strains of {strain:.3g}, beyond the {NEGLECTED} up to which linear "
+            f"temperatures and initial states cause strains of {strain:.3g}, beyond the {WARNING_RATIO} up to which linear "
             "kinematics are accurate: are they in the units of the model?"
         )
 
 
 def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterator[str]:
     angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
-    if angle**2 > NEGLECTED:  # the change of area that linear kinematics neglect
+    if angle**2 > WARNING_RATIO:  # the change of area that linear kinematics neglect
         yield (
             f"the largest rotation is {angle:.3f} rad, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
         return
+    neglected, work_by_body = _work_on_strains(problem, last)
+    # Bodies whose work on strains is round-off relative to that of other bodies are free of stress.
+    least_work = max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY)
+    ratio = np.abs(neglected) / np.maximum(work_by_body, least_work)
+    # Even small rotations matter under large stresses. In bodies whose stresses are only due to neglected strains, the works
+    # on strains and on neglected strains are about equal.
+    is_preloaded = bool(((ratio > WARNING_RATIO) & (ratio < 0.5)).any())
     friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
-    if angle > 0.5 * OUT_OF_BALANCE * friction or _is_preloaded(problem, last):
-        yield from _neglected_rotation(problem, last, angle)
-
-
-def _is_preloaded(problem: Problem, last: StepResult) -> bool:
-    """Return whether the stresses of a body are so large that even small rotations matter, estimated at centres of cells.
-
-    In bodies without other stresses than those due to neglected strains, the works on strains and on neglected strains are
-    about equal. Such bodies are not included.
-    """
-    ratio = _ratio(*_work_on_strains(problem, last, at_centres=True))
-    return bool(((ratio > NEGLECTED) & (ratio < 0.5)).any())
+    if angle > 0.5 * OUT_OF_BALANCE * friction or is_preloaded:
+        yield from _neglected_rotation(problem, last, angle, neglected, ratio)
 
 
 def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
@@ -392,20 +387,14 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     return float(square**0.5), point
 
 
-def _open_clearances(problem: Problem, state: State) -> set[str]:
-    """Return the names of automatically detected pairs that begin open and never close, such as a shank in its hole."""
-    gap_by_pair = {pair.name: pair.detected_gap for pair in problem.model.contact if pair.detected_gap is not None}
-    if not state.touched & gap_by_pair.keys():
-        return set()
-    least_gap = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
-    return {name for name, gap in gap_by_pair.items() if gap > least_gap and name not in state.touched}
-
-
-def _open_contact(problem: Problem, name: str, last: StepResult, touched: bool, loaded: bool) -> Iterator[str]:
+def _open_contact(problem: Problem, state: State, name: str, last: StepResult, loaded: bool) -> Iterator[str]:
     """Yield a warning if a pair never closed, or is open although loads still act."""
-    pair, contact = problem.pairs[name], last.contact[name]
+    pair, contact, touched = problem.pairs[name], last.contact[name], name in state.touched
     search_distance, facing = pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
-    smallest = float(facing.min(initial=np.inf))
+    smallest, round_off = float(facing.min(initial=np.inf)), LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+    detected_gaps = {pair.name: pair.detected_gap for pair in problem.model.contact if pair.detected_gap is not None}
+    if not touched and detected_gaps.get(name, 0.0) > round_off and state.touched & detected_gaps.keys():
+        return  # an automatically detected clearance, such as that of a shank in its hole, may remain open
     gap = f"the smallest gap is {smallest:.4g}" if len(facing) else "no node faces the other side"
     if contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None:  # visible in results
         return
@@ -414,7 +403,7 @@ def _open_contact(problem: Problem, name: str, last: StepResult, touched: bool, 
             f"contact '{name}' carries nothing where its sides penetrate by {-smallest:.4g}, more than its "
             f"search_distance {search_distance:.4g}: raise that, or use more load steps"
         )
-    elif smallest < -LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max()) and not touched:
+    elif smallest < -round_off and not touched:
         yield (
             f"contact '{name}' carries nothing although its sides penetrate by {-smallest:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
@@ -477,18 +466,11 @@ def facets_across_radius(side: Surface, closed: Mask, excluded: Mask) -> int | N
     closed, excluded : ndarray of bool (m,)
         Nodes of the side in contact; nodes excluded by the user, which do not form an edge.
     """
-    reached = ~closed & ~excluded
-    if not reached.any():
+    edge = np.flatnonzero(~closed & ~excluded)
+    if not len(edge):
         return None
-    count = 0
-    while not reached[closed].all():
-        wider = reached.copy()
-        for block in side.blocks:
-            wider[block.local[reached[block.local].any(axis=1)]] = True
-        if (wider == reached).all():  # the rest of the contact is closed from end to end
-            return None
-        reached, count = wider, count + 1
-    return count
+    distance = dijkstra(side.node_adjacency, indices=edge, unweighted=True, min_only=True)[closed].max(initial=0.0)
+    return int(distance) if np.isfinite(distance) else None  # infinite where contact is closed from end to end
 
 
 def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model) -> Iterator[str]:
@@ -548,13 +530,13 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
             return f"exchange the sides, since the body of '{primary.group}' is softer"
     if pair.name != "mortar":
         return "use formulation mortar"
-    beside = [name for name, block in model.mesh.solids.items() if np.isin(block, side.points).any()]
-    if any(name[:3] not in ("qua", "hex") for name in beside):
+    adjacent = [name for name, block in model.mesh.solids.items() if np.isin(block, side.points).any()]
+    if any(name[:3] not in ("qua", "hex") for name in adjacent):
         return f"use quadrangles or hexahedra along '{group}', or triangles or tetrahedra there about as deep as wide"
     if not isinstance(primary, Surface):
         return f"use smaller facets of '{group}'"
     length, opposite = (facet_length(surface, pair.points) for surface in (side, primary))
-    if length > (1.0 + NEGLECTED) * opposite:
+    if length > (1.0 + WARNING_RATIO) * opposite:
         return f"use facets of '{group}' that are at most as large as the opposite ones"
     if side.order == 2 and pair.points.shape[1] == 2 and getattr(pair, "multipliers", "") == "dual":
         # Errors of pressures on a heated shrink fit were 0.11 to 0.17, and with standard multipliers at most 0.002. At sharp
@@ -566,8 +548,8 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
 def _modulus(model: Model, points: NDArray[np.integer]) -> float:
     """Return the mean contact modulus of the cells at `points` [pressure]."""
     solids = model.mesh.solids
-    beside = [moduli[np.isin(solids[name], points).any(axis=1)] for name, moduli in model.contact_moduli().items()]
-    return float(np.concatenate(beside).mean())
+    moduli = [values[np.isin(solids[name], points).any(axis=1)] for name, values in model.contact_moduli().items()]
+    return float(np.concatenate(moduli).mean())
 
 
 def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -> Iterator[str]:
@@ -586,7 +568,7 @@ def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: Contact
     inside = contact.active & ~near_open
     means = (side.extended_adjacency[inside] @ (weight * contact.pressure)) / (side.extended_adjacency[inside] @ weight)
     mean, peak = float(means.max(initial=0.0)), contact.pressure.argmax()
-    if (side.extended_adjacency @ near_open)[peak] and contact.pressure_max > (1.0 + NEGLECTED) * mean > 0.0:
+    if (side.extended_adjacency @ near_open)[peak] and contact.pressure_max > (1.0 + WARNING_RATIO) * mean > 0.0:
         remedy = ", or formulation mortar" if pair.name != "mortar" and not isinstance(pair.primary, Surface) else ""
         yield (
             f"contact '{contact.name}': the largest nodal pressure, {contact.pressure_max:.4g}, is within four facets of "
@@ -601,28 +583,32 @@ def _alternation_matrix(side: Surface) -> csr_array:
 
     On quadratic facets they alternate between corners and other nodes, and on linear ones between any two.
     """
-    adjacency, kind = side.node_adjacency.tocoo(), np.arange(len(side.points))
-    if side.order == 2:
-        kind[:] = 0
-        for block in side.blocks:
-            kind[block.local[:, : elements.get(block.element).n_corners]] = 1
-    row, column = adjacency.coords
-    differ = kind[row] != kind[column]
-    return csr_array((adjacency.data[differ], (row[differ], column[differ])), shape=adjacency.shape)
+    adjacency = side.node_adjacency
+    if side.order == 1:
+        return csr_array(adjacency - diags_array(adjacency.diagonal()))
+    is_corner = np.zeros(len(side.points))
+    for block in side.blocks:
+        is_corner[block.local[:, : elements.get(block.element).n_corners]] = 1.0
+    corners, others = diags_array(is_corner), diags_array(1.0 - is_corner)
+    return csr_array(corners @ adjacency @ others + others @ adjacency @ corners)
 
 
-def _neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iterator[str]:
-    """Yield a warning for the body in which linear kinematics neglect most; `angle` is the largest rotation [radian]."""
+def _neglected_rotation(
+    problem: Problem, last: StepResult, angle: float, neglected: Array, ratio: Array
+) -> Iterator[str]:
+    """Yield a warning for the body in which linear kinematics neglect most.
+
+    `angle` is the largest rotation [radian], `neglected` (n_bodies,) the work on neglected strains [energy], and `ratio`
+    (n_bodies,) its magnitude relative to the work on strains [-].
+    """
     mesh = problem.model.mesh
-    neglected, work_by_body = _work_on_strains(problem, last)
-    ratio = _ratio(neglected, work_by_body)
     worst = int(np.argmax(ratio))
-    if ratio[worst] > NEGLECTED:
+    if ratio[worst] > WARNING_RATIO:
         name = body_name(mesh, bodies(mesh)[1], worst)
-        share = f"{ratio[worst]:.0%} of their work on" if ratio[worst] <= 1.0 else "more work than on"
+        comparison = f"{ratio[worst]:.0%} of their work on" if ratio[worst] <= 1.0 else "more work than on"
         yield (
             f"rotations of up to {angle:.2g} rad matter in body {name}: on the strains that linear kinematics neglect its "
-            f"stresses would do {share} strains. Solve the model with strain='finite'"
+            f"stresses would do {comparison} strains. Solve the model with strain='finite'"
         )
         return
     capacity = _frictional_capacity(problem, last)
@@ -665,18 +651,10 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
     return capacity
 
 
-def _ratio(neglected: Array, work_by_body: Array) -> Array:
-    """Return the ratio (n_bodies,) of the results of `_work_on_strains` [-]."""
-    # Bodies whose work on strains is round-off relative to that of other bodies are free of stress.
-    return np.abs(neglected) / np.maximum(work_by_body, max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY))
-
-
-def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = False) -> tuple[Array, Array]:
+def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
     """Return the work of stresses on neglected strains, and the integral of its absolute value on linear strains.
 
     Both are arrays (n_bodies,) [energy].
-
-    With `at_centres`, strains at the centres of cells are used, which is faster and underestimates those of bending.
     """
     mesh, axisymmetric = problem.model.mesh, problem.model.kinematics == "axisymmetric"
     count, body = bodies(mesh)
@@ -684,21 +662,19 @@ def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = Fals
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, weights = element.quadrature
-        if at_centres:
-            xi, weights = element.nodes[: element.n_corners].mean(axis=0)[None], np.array([weights.sum()])
         N, dN = element.shape(xi), element.gradient(xi)
         for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
             slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
             stress, volume = N @ last.stress[cells], np.abs(volume) * weights
-            tensor = stress[..., PAIRS[mesh.dim]]
-            strain_work = np.einsum("cqij,cqij->cq", tensor, slope)
+            stress_tensor = stress[..., PAIRS[mesh.dim]]
+            strain_work = np.einsum("cqij,cqij->cq", stress_tensor, slope)
             if axisymmetric:
                 radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
                 volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_u / radius
             rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
             # The neglected strain is 0.5 W.T @ W = -0.5 W @ W, since the rotation W is antisymmetric.
-            neglected_work = -0.5 * np.einsum("cqij,cqij->cq", tensor, rotation @ rotation)
-            size, rotated = (np.linalg.norm(part, axis=(2, 3)) for part in (slope - rotation, rotation))
+            neglected_work = -0.5 * np.einsum("cqij,cqij->cq", stress_tensor, rotation @ rotation)
+            size, rotated = (np.linalg.norm(tensor, axis=(2, 3)) for tensor in (slope - rotation, rotation))
             neglected_work[size < SINGLE_PRECISION * rotated] = 0.0  # stresses of a rigid-body motion are round-off
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
             np.add.at(work_by_body, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))

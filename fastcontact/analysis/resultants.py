@@ -185,9 +185,7 @@ def _covered(pair: Formulation, step: StepResult, name: str) -> Array | float:
     """Return the fraction (n_nodes,) of the tributary areas that has an opposite side; 1 against obstacles [-]."""
     if isinstance(pair.primary, RigidSide):
         return 1.0
-    field = pair.unilateral(end_of(None, step, name)).nodal
-    assert field is not None
-    return field.covered
+    return pair.unilateral(end_of(None, step, name)).nodal_field.covered
 
 
 #: The earlier name of `ContactResultants`.
@@ -198,12 +196,10 @@ contact_answers = contact_resultants
 
 def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactResultants:
     closed, facing = contact.active, np.isfinite(contact.gap)
-    normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
-    normal_forces = np.einsum("nd,nd->n", contact.force_vectors, normal)
-    total, area = float(normal_forces.sum()), float(areas[closed].sum())
+    total, area = contact.normal_force, float(areas[closed].sum())
     in_compression, x = bool(total > 0.0), contact.positions
     moment = contact_moment(contact)
-    centre = normal_forces @ x / total if in_compression else np.full(x.shape[1], np.nan)
+    centre = contact.normal_forces @ x / total if in_compression else np.full(x.shape[1], np.nan)
     if axisymmetric:
         centre[0] = np.nan
     return ContactResultants(
@@ -211,7 +207,7 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
         moment=np.zeros_like(moment) if axisymmetric else moment,
         area=area,
         centre=centre,
-        normal_force=contact.normal_force,
+        normal_force=total,
         mean_gap=float(areas[facing] @ contact.gap[facing] / areas[facing].sum()) if facing.any() else float("nan"),
         pressure_mean=total / area if area else 0.0,
         pressure_max=contact.pressure_max,
@@ -433,7 +429,7 @@ def reference_reactions(
 def _at_supports(
     model: Model, relations: Sequence[MultiPointConstraint], supported: Mask, reaction: Array, u: Array
 ) -> tuple[Array, list[Array]]:
-    """Return the nodal forces (n_points, dim) of supports alone, and the forces of constraints, `relations` first [force].
+    """Return the nodal forces (n_points, dim) of supports, and the Lagrange multipliers of each of the `relations` [force].
 
     `reaction` and the displacements `u` [length] have the shape (n_points, dim) or (n_dofs,).
     """

@@ -122,10 +122,10 @@ class SharedNodes:
     def of_representatives(
         self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Return the gaps (m,) [length], normal and tangential forces (m,), (m, dim) [force] and closing slips (m, dim) of
-        representatives.
+        """Return four quantities of representatives, given those of all constraints.
 
-        The arguments are the same quantities of all constraints.
+        They are gaps (m,) [length], normal forces (m,) and tangential forces (m, dim) [force], and the tangential relative
+        displacements (m, dim) that close gaps [length].
         """
         tangents = np.stack(constraints.directions, axis=1)
         weighted = (traction, np.ones(len(gap))), (closing, self.tangential_fraction)
@@ -231,14 +231,14 @@ def _fractions(constraints: StackedConstraints, representative: Indices) -> tupl
 
 def _areas(constraints: StackedConstraints) -> Array:
     """Return the area of each constraint (m,), NaN without one [area]."""
-    parts = constraints.parts.values()
-    return np.concatenate([np.full(len(part), np.nan) if part.areas is None else part.areas for part in parts])
+    pairs = constraints.parts.values()
+    return np.concatenate([np.full(len(pair), np.nan) if pair.areas is None else pair.areas for pair in pairs])
 
 
 def _nodes(constraints: StackedConstraints) -> Indices:
     """Return the node of each constraint (m,), -1 without one or where a compliance couples it with others."""
-    parts = constraints.parts.values()
-    nodes = [np.full(len(part), -1) if part.nodes is None or part.coupled else part.nodes for part in parts]
+    pairs = constraints.parts.values()
+    nodes = [np.full(len(pair), -1) if pair.nodes is None or pair.coupled else pair.nodes for pair in pairs]
     return np.concatenate(nodes).astype(np.intp)
 
 

@@ -8,7 +8,7 @@ deformations, they are computed only once, before the contact.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -33,28 +33,16 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
 
 
-@dataclass(frozen=True, eq=False)
-class HeatSolution(Temperatures):
-    """Temperatures with the heat flux through contacts.
-
-    Attributes
-    ----------
-    fluxes : dict of str to ndarray (m,)
-        Heat flux at the secondary nodes of each contact pair that conducts heat [power / area].
-    """
-
-    fluxes: dict[str, Array]
-
-    def with_heat_results(self, problem: Problem, step: StepResult) -> StepResult:
-        """Return the result of a load step with heat fluxes and heat reactions added."""
-        assert problem.heat is not None
-        flux = problem.heat.conduction_at(step.displacement).flux(self.rise)
-        with_flux = {name: replace(step.contact[name], heat_flux=power) for name, power in self.fluxes.items()}
-        return replace(
-            step, contact=step.contact | with_flux, heat_reaction=self.reaction,
-            iterations={**step.iterations, "heat": self.balance},
-            cell_fields={**step.cell_fields, **dict(zip(HEAT_FLUX, flux.T, strict=False))},
-        )  # fmt: skip
+def with_heat_results(problem: Problem, temperatures: Temperatures, step: StepResult) -> StepResult:
+    """Return the result of a load step with heat fluxes and heat reactions added."""
+    assert problem.heat is not None
+    cell_flux = problem.heat.conduction_at(step.displacement).flux(temperatures.rise)
+    with_flux = {name: replace(step.contact[name], heat_flux=flux) for name, flux in temperatures.fluxes.items()}
+    return replace(
+        step, contact=step.contact | with_flux, heat_reaction=temperatures.reaction,
+        iterations={**step.iterations, "heat": temperatures.balance},
+        cell_fields={**step.cell_fields, **dict(zip(HEAT_FLUX, cell_flux.T, strict=False))},
+    )  # fmt: skip
 
 
 def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Array:
@@ -67,7 +55,7 @@ def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Ar
 def settle_heat(
     problem: Problem, start: State, load: StepLoad, instant: float, rise: Array, equilibrium: StepEquilibrium,
     solve: Solve,
-) -> tuple[HeatSolution, StepEquilibrium]:  # fmt: skip
+) -> tuple[Temperatures, StepEquilibrium]:  # fmt: skip
     """Return the temperatures and the equilibrium of a load step.
 
     Parameters
@@ -96,14 +84,14 @@ def settle_heat(
     tolerance = max(problem.criteria.geometry, 10 * heat.linear_tolerance)
     change, limit = np.inf, max(problem.criteria.max_geometry_updates, 1)
     for exchange in range(1, limit + 1):
-        heat_solution = _steady_temperatures(problem, start, load, instant, equilibrium)
-        difference = heat_solution.rise - rise
+        temperatures = _steady_temperatures(problem, start, load, instant, equilibrium)
+        difference = temperatures.rise - rise
         change = largest(difference)
-        settled = change <= tolerance * largest(heat_solution.rise) or not problem.model.expands
+        settled = change <= tolerance * largest(temperatures.rise) or not problem.model.expands
         negligible = max(tolerance * equilibrium.balance.largest, equilibrium.balance.noise)
         if settled or largest(problem.model.expansion_forces(problem.field, difference).ravel()) <= negligible:
-            return replace(heat_solution, balance={**heat_solution.balance, "exchanges": exchange}), equilibrium
-        rise = mixing.mixed(rise, heat_solution.rise)
+            return replace(temperatures, balance={**temperatures.balance, "exchanges": exchange}), equilibrium
+        rise = mixing.mixed(rise, temperatures.rise)
         equilibrium = solve(thermal_load(problem, load, rise), equilibrium)
     raise ConvergenceError(
         f"heat and contact do not converge: after {limit} exchanges, temperatures still change by {change:.3g}, for "
@@ -133,7 +121,7 @@ def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
 
 def _steady_temperatures(
     problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium
-) -> HeatSolution:
+) -> Temperatures:
     """Return the temperatures for the contact conductances and the frictional heat of an equilibrium."""
     settled, u = equilibrium.settled, equilibrium.u
     heat, displacement = problem.heat, problem.displacement(u)
@@ -148,7 +136,6 @@ def _steady_temperatures(
         rows, solution = settled.constraints.rows[name], settled.solution
         configuration = problem.configuration(name, start, load, displacement, u)
         constraints, force, gap = _normal_state(problem, settled, name, rows, configuration)
-        assert constraints.nodal is not None
         link = heat_transfer(constraints, pair.secondary, pair.primary, pair.points.shape)
         area_ratio = np.ones(n)  # ratio of deformed to undeformed area at each node
         if heat.finite_strain:
@@ -165,15 +152,16 @@ def _steady_temperatures(
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
                 obstacles = csr_array(obstacles + link.matrix(h))
                 obstacle_power = obstacle_power + link.secondary.T @ (h * link.area * obstacle_rise)
-            conducting[name] = link, constraints.nodal, h, obstacle_rise, area_ratio[pair.secondary.points]
+            conducting[name] = link, constraints.nodal_field, h, obstacle_rise, area_ratio[pair.secondary.points]
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
-    powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in conducting.items()}
-    fluxes = {name: conducting[name][1].side_pressure(power) / conducting[name][4] for name, power in powers.items()}
-    balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
-    return HeatSolution(steady.rise, steady.reaction, balance, fluxes)
+    fluxes, heat_flows = {}, {}
+    for name, (link, field, h, obstacle_rise, area_ratio) in conducting.items():
+        power = h * link.area * (link.jump @ steady.rise - obstacle_rise)
+        fluxes[name], heat_flows[name] = field.side_pressure(power) / area_ratio, float(power.sum())
+    return replace(steady, balance={**steady.balance, "contacts": heat_flows}, fluxes=fluxes)
 
 
 def _normal_state(

@@ -364,10 +364,15 @@ class Constraints:
             slips += np.einsum("md,kmd->mk", self.compliance.apply(forces), np.stack(axes))
         return np.einsum("mk,kmd->md", slips, np.stack(self.directions))
 
+    @property
+    def nodal_field(self) -> NodalField:
+        """The field `nodal`, which the constraints of every contact pair have."""
+        assert self.nodal is not None
+        return self.nodal
+
     def pressure(self, multiplier: Array) -> Array:
         """Return nodal pressures (n_nodes,) per unit reference area for multipliers (m,) [pressure]."""
-        assert self.nodal is not None
-        return self.nodal.pressure(self.normal_forces(multiplier))
+        return self.nodal_field.pressure(self.normal_forces(multiplier))
 
 
 @dataclass(frozen=True, eq=False)

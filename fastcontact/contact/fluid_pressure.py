@@ -119,13 +119,12 @@ def with_fluid_pressure(
     if not config.fluid_pressure > 0.0:
         return constraints
     assert constraints.areas is not None
-    assert constraints.nodal is not None
     side, points = areas.side, areas.points
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
     deformation = config.linearisation_point
     vectors = areas.with_derivative(np.zeros_like(points) if deformation is None else deformation)[0]
     gaps = constraints.gaps(config.displacement)
-    nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
+    nodal, node = constraints.nodal_field.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     if config.pressure is None:
         passable = nodal > LENGTH_ROUND_OFF * size
     else:

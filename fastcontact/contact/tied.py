@@ -98,9 +98,8 @@ def tied_pair(
     if reduction is not None:
         reduced_rows, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(weights)
         rows = [csr_array(reduced_rows[first : first + q]) for first in range(0, reduced_rows.shape[0], q)]
-    assert constraints.nodal is not None
     return TiedPair(
-        moments, tuple(map(_without_round_off, rows)), constraints.directions, positions, constraints.nodal,
+        moments, tuple(map(_without_round_off, rows)), constraints.directions, positions, constraints.nodal_field,
         constraints.nodes, areas, reduction,
     )  # fmt: skip
 

@@ -163,6 +163,13 @@ def rotations(frame: Array) -> Array:
     return rotation
 
 
+def rotated_stress(stress: Array, rotation: Array) -> Array:
+    """Return stresses (n, 4 or 6) of a body rotated by a rotation matrix (dim, dim) [pressure]."""
+    Q, size = np.eye(3), stress.shape[1]
+    Q[: len(rotation), : len(rotation)] = rotation
+    return np.asarray(stress @ rotations(Q.T[None])[0, :size, :size].T)
+
+
 def _vectors(values: Any, name: str) -> Array:
     """Return `values` as an array; raise a ModelError that contains `name` if they are not finite numbers."""
     try:

@@ -344,18 +344,19 @@ class Results(StepSequence):
         if not self._file:
             raise FileError(f"'{self.path}' is closed: open it again to read more steps")
         with self._as_file_errors():
-            notes, stored = self._notes_of_step(number), self.point_field_names
+            notes, cells = self._notes_of_step(number), self._file["VTKHDF/Types"].shape
+            stored = {k: v for k, v in layout.step_shapes(self.mesh).items() if k in self.point_field_names}
             return StepResult(
                 index=int(self._rows["index"][number]),
                 load_factor=float(self._rows["load_factor"][number]),
                 contact=self._read_contacts(number, dict(notes["contact"])),
                 iterations=notes["iterations"],
                 warnings=tuple(notes["warnings"]),
-                cell_fields=self._read_cell_fields(number),
+                cell_fields={k: self._read_field("CellData", k, number, cells, "biuf") for k in self.cell_field_names},
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
                 material_stress=self._material_stress(number),
                 units=self.units,
-                **{k: self._read_field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in stored},
+                **{k: self._read_field("PointData", k, number, shape) for k, shape in stored.items()},
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
@@ -398,19 +399,11 @@ class Results(StepSequence):
         constant = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in constant]
 
-    def _read_cell_fields(self, number: int) -> dict[str, Array]:
-        data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
-        fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
-        for name, values in fields.items():
-            if values.shape != (n,) or values.dtype.kind not in "biuf":
-                raise ValueError(f"{name} of step {number} is truncated, or has the wrong shape or type")
-        return fields
-
-    def _read_field(self, name: str, number: int, shape: tuple[int, ...]) -> Array:
-        n = self.mesh.n_points
-        rows = slice(number * n, (number + 1) * n)
-        values = self._file["VTKHDF/PointData"][name][(rows, *map(slice, shape[1:]))]
-        if values.shape != shape or values.dtype.kind != "f":
+    def _read_field(self, group: str, name: str, number: int, shape: tuple[int, ...], kinds: str = "f") -> Array:
+        """Return a field of step `number` after a check of its `shape` and of the kind of its data type."""
+        rows = slice(number * shape[0], (number + 1) * shape[0])
+        values = self._file[f"VTKHDF/{group}/{name}"][(rows, *map(slice, shape[1:]))]
+        if values.shape != shape or values.dtype.kind not in kinds:
             raise ValueError(f"{name} of step {number} is truncated, or has the wrong shape or type")
         return values
 

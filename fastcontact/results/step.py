@@ -368,14 +368,21 @@ class ContactResult(NameSuggestions):
     @property
     def normal_force(self) -> float:
         """Sum of the normal components of the nodal forces, positive in compression [force]."""
-        normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
-        return float(np.einsum("nd,nd->", self.force_vectors, normal))
+        return float(self.normal_forces.sum())
+
+    @property
+    def _finite_normal(self) -> Array:
+        return np.where(np.isfinite(self.normal), self.normal, 0.0)
+
+    @property
+    def normal_forces(self) -> Array:
+        """Normal components (m,) of the nodal forces, positive in compression; zero without an opposite point [force]."""
+        return np.einsum("nd,nd->n", self.force_vectors, self._finite_normal)
 
     @property
     def force_parts(self) -> tuple[float, float, float]:
         """Magnitudes of `force` and of its normal and tangential parts [force]; without friction the last is zero."""
-        normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
-        along = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
+        along = self.normal_forces @ self._finite_normal if self.shear.any() else self.force
         along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
         total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)
         return float(total), float(normal_part), float(tangential)

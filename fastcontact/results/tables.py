@@ -22,6 +22,11 @@ from fastcontact.results.units import column_units
 Columns = dict[str, AnyArray]
 
 AXES = ("x", "y", "z")
+# Quantities that determine the units of the nodal arrays of steps in datasets.
+NODAL_QUANTITIES = {
+    "displacement": "length", "stress": "pressure", "von_mises": "pressure", "von_mises_signed": "pressure",
+    "reaction": "force",
+}  # fmt: skip
 STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
@@ -359,34 +364,24 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     xarray, all_steps, dim = import_library("xarray", "xarray", "xarray"), list(steps), mesh.dim
     pairs = list(dict.fromkeys(name for step in all_steps for name in step.contact))
     components = list(STRESS_COMPONENTS[: 4 if dim == 2 else 6])
-
-    def values_of_pairs(name: str, missing: Any) -> list[Any]:
-        return [
-            [getattr(c[pair], name) if pair in c else missing for pair in pairs] for c in (s.contact for s in all_steps)
-        ]
-
-    fields: dict[str, tuple[tuple[str, ...], str]] = {
-        "displacement": (("point", "axis"), "length"),
-        "stress": (("point", "stress_component"), "pressure"),
-        "von_mises": (("point",), "pressure"),
-        "von_mises_signed": (("point",), "pressure"),
-        "reaction": (("point", "axis"), "force"),
-    }
-    columns: dict[str, tuple[tuple[str, ...], str, list[Any]]]
-    columns = {name: (*kind, [getattr(step, name) for step in all_steps]) for name, kind in fields.items()}
-    contact_values = [layout.contact_fields(mesh, step) for step in all_steps]
-    for name, (_, quantity) in layout.CONTACT_FIELDS.items():
-        if all(name in contact for contact in contact_values):
-            dims: tuple[str, ...] = ("point",) if layout.POINT_FIELDS[name] == 1 else ("point", "axis")
-            columns[name] = dims, quantity, [contact[name] for contact in contact_values]
-    columns["contact_force"] = ("contact", "axis"), "force", values_of_pairs("force", np.full(dim, np.nan))
-    columns["contact_pressure_max"] = ("contact",), "pressure", values_of_pairs("pressure_max", np.nan)
     sizes = {"point": mesh.n_points, "axis": dim, "stress_component": len(components), "contact": len(pairs)}
     data = {}
-    for name, (dims, quantity, values_of_steps) in columns.items():
-        values = np.array(values_of_steps, np.float64)
-        values = values.reshape(len(all_steps), *(sizes[name_of_dim] for name_of_dim in dims))
-        data[name] = (("step", *dims), values, _unit(units, quantity))
+
+    def add(name: str, dims: tuple[str, ...], quantity: str, values: list[Any]) -> None:
+        shape = len(all_steps), *(sizes[axis] for axis in dims)
+        data[name] = ("step", *dims), np.array(values, np.float64).reshape(shape), _unit(units, quantity)
+
+    quantities = NODAL_QUANTITIES | {name: quantity for name, (_, quantity) in layout.CONTACT_FIELDS.items()}
+    fields = [step.__dict__ | layout.contact_fields(mesh, step) for step in all_steps]
+    for name, quantity in quantities.items():
+        if all(name in of_step for of_step in fields):
+            dims = ("point", *{1: (), 3: ("axis",), 6: ("stress_component",)}[layout.POINT_FIELDS[name]])
+            add(name, dims, quantity, [of_step[name] for of_step in fields])
+    contacts = [[step.contact.get(pair) for pair in pairs] for step in all_steps]
+    force = [[np.full(dim, np.nan) if c is None else c.force for c in of_step] for of_step in contacts]
+    pressure = [[np.nan if c is None else c.pressure_max for c in of_step] for of_step in contacts]
+    add("contact_force", ("contact", "axis"), "force", force)
+    add("contact_pressure_max", ("contact",), "pressure", pressure)
     coordinates = {
         "step": [step.index for step in all_steps],
         "load_factor": ("step", [step.load_factor for step in all_steps]),

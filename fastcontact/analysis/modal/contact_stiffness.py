@@ -29,11 +29,13 @@ def contact_stiffness(model: Model, step: StepResult, held: HeldMotions) -> csr_
     for pair in model.contact:
         formulation = model.bind(pair, held, sectors_alike=False)
         if formulation.options.kind not in ("gap_only", "tied"):
-            K += driven.contact_stiffness(pair.name, _of_pair(formulation, step, pair.name, model.strain == "finite"))
+            K += driven.contact_stiffness(
+                pair.name, _pair_stiffness(formulation, step, pair.name, model.strain == "finite")
+            )
     return K
 
 
-def _of_pair(pair: Formulation, step: StepResult, name: str, finite: bool) -> csr_array:
+def _pair_stiffness(pair: Formulation, step: StepResult, name: str, finite: bool) -> csr_array:
     """Return the stiffness (n_dofs, n_dofs) of the pressure on the secondary side of a pair [force / length]."""
     configuration, deformed, pressure = configuration_of(step, name, pair), pair.points + step.displacement, []
     for block in pair.secondary.blocks:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import bmat, bsr_array, coo_array, csr_array
+from scipy.sparse import bmat, bsr_array, csr_array, eye_array, vstack
 
 from fastcontact.analysis.modal.held_contact import Conditions
 from fastcontact.arrays import AnyArray, Array, Indices
@@ -25,12 +25,12 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 @dataclass(frozen=True, eq=False)
 class Sectors:
-    """The sectors of a ring.
+    """The sectors of a ring, or a single sector if the model has no cyclic symmetry.
 
     Attributes
     ----------
     number : int
-        Number N of sectors in the ring.
+        Number N of sectors in the ring; 1 without cyclic symmetry.
     turn : ndarray (dim, dim)
         Rotation of vectors from one sector to the next [-].
     periodic_interfaces : list of PeriodicInterface
@@ -45,11 +45,11 @@ class Sectors:
     centre: Array
 
     @classmethod
-    def of(cls, model: Model) -> Sectors | None:
-        """Return the sectors of a model; None without cyclic symmetry. ModelError if axes or numbers of sectors differ."""
+    def of(cls, model: Model) -> Sectors:
+        """Return the sectors of a model. Raises ModelError if the axes or the numbers of sectors of symmetries differ."""
         periodic_interfaces = [interface for interface in model.periodic_interfaces if interface.relation is not None]
         if not periodic_interfaces:
-            return None
+            return cls(1, np.eye(model.mesh.dim), [], np.zeros(model.mesh.dim))
         first = periodic_interfaces[0]
         assert first.turn is not None
         for interface in periodic_interfaces:
@@ -95,25 +95,25 @@ class Wave:
         return 2.0 * np.pi * self.diameters / self.sectors.number
 
     @property
-    def single(self) -> bool:
+    def is_standing(self) -> bool:
         """Whether the wave is a standing wave. Other modes occur in pairs that are shifted by a quarter of a wave."""
         return 2 * self.diameters in (0, self.sectors.number)
 
     def phase(self, interface: PeriodicInterface) -> complex:
         """Return the phase factor from the first to the second end of an interface, in addition to the rotation [-]."""
-        if self.single:
+        if self.is_standing:
             return 1.0 if self.diameters == 0 else -1.0
         return complex(np.exp(1j * _sense(interface, self.sectors.turn) * self.angle))
 
-    def real(self, A: AnyArray) -> csr_array:
+    def real_form(self, A: AnyArray) -> csr_array:
         """Return the real form of a sparse matrix (m, n), complex or not."""
-        blocks = csr_array(A.real if self.single else bmat([[A.real, -A.imag], [A.imag, A.real]], format="csr"))
+        blocks = csr_array(A.real if self.is_standing else bmat([[A.real, -A.imag], [A.imag, A.real]], format="csr"))
         blocks.eliminate_zeros()
         return blocks
 
-    def real_blocks(self, K: bsr_array) -> bsr_array:
+    def real_block_form(self, K: bsr_array) -> bsr_array:
         """Return the real form of a real block matrix (n, n), with the same block size."""
-        if self.single:
+        if self.is_standing:
             return K
         n, entries = K.shape[0] // K.blocksize[0], len(K.indices)
         data = np.concatenate([K.data, K.data])
@@ -121,17 +121,17 @@ class Wave:
         return bsr_array((data, indices, indptr), shape=(2 * K.shape[0], 2 * K.shape[0]))
 
     def repeated(self, values: AnyArray) -> AnyArray:
-        """Return values (n, ...) of nodes or displacements, repeated for the imaginary part unless `single`."""
-        return values if self.single else np.concatenate([values, values])
+        """Return values (n, ...) of nodes or displacements, repeated for the imaginary part unless the wave is standing."""
+        return values if self.is_standing else np.concatenate([values, values])
 
     def relations(self, model: Model, others: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
         """Return the constraints `others`, and those with phase factors between the ends of the sector, in the real form."""
         rows = [(constraint.name, constraint.rows) for constraint in others]
         for interface in self.sectors.periodic_interfaces:
             rows.append(("cyclic symmetry", turned_rows(interface, self.phase(interface), model.mesh)))
-        return [MultiPointConstraint(name, self.real(of_constraint)) for name, of_constraint in rows]
+        return [MultiPointConstraint(name, self.real_form(of_constraint)) for name, of_constraint in rows]
 
-    def on_ring(self, conditions: Conditions) -> Conditions:
+    def ring_conditions(self, conditions: Conditions) -> Conditions:
         """Return contact conditions in the real form, one at each point of the ring.
 
         The test function of a condition at one end of a sector extends into the next sector, which is represented by the
@@ -140,36 +140,31 @@ class Wave:
         P, main = self._combination_matrix(conditions)
         nodes, areas = conditions.nodes[main], self.repeated(conditions.areas[main])
         n_points = conditions.rows.shape[1] // self.sectors.turn.shape[0]
-        compliance = None if conditions.compliance is None else self.real(P @ conditions.compliance @ P.conj().T)
-        ring_nodes = nodes if self.single else np.concatenate([nodes, nodes + n_points])
-        return Conditions(self.real(P @ conditions.rows), ring_nodes, areas, compliance=compliance)
+        compliance = None if conditions.compliance is None else self.real_form(P @ conditions.compliance @ P.conj().T)
+        ring_nodes = nodes if self.is_standing else np.concatenate([nodes, nodes + n_points])
+        return Conditions(self.real_form(P @ conditions.rows), ring_nodes, areas, compliance=compliance)
 
     def _combination_matrix(self, conditions: Conditions) -> tuple[csr_array, Indices]:
         """Return the matrix (k, q) that maps conditions to those of the ring, and the main condition (k,) of each."""
-        nodes = conditions.nodes
-        is_single, blocks = np.ones(len(nodes), bool), []
+        nodes, identity = conditions.nodes, eye_array(len(conditions.nodes), dtype=complex, format="csr")
+        rows, main_conditions, is_single = [], [], np.ones(len(nodes), bool)
         for interface in self.sectors.periodic_interfaces:
             on_interface = np.flatnonzero(np.isin(nodes, interface.first) | np.isin(nodes, interface.second))
             for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
                 first, second = (on_interface[nodes[on_interface] == node] for node in (a, b))
                 if a == b and len(first):
-                    blocks.append((self._combinations_at_axis(conditions, first), first, first))
-                    is_single[first] = False
+                    members, block = first, self._combinations_at_axis(conditions, first)
                 elif len(first) and len(second):
+                    members = np.concatenate([first, second])
                     block = self._combinations_across(conditions, interface, first, second)
-                    blocks.append((block, first, np.concatenate([first, second])))
-                    is_single[first] = is_single[second] = False
+                else:
+                    continue
+                rows.append(csr_array(block) @ identity[members])
+                main_conditions.append(first[: len(block)])
+                is_single[members] = False
         single = np.flatnonzero(is_single)
-        rows, columns, values = [np.arange(len(single))], [single], [np.ones(len(single), complex)]
-        main_conditions, count = [single], len(single)
-        for block, main, members in blocks:
-            rows.append(np.repeat(count + np.arange(len(block)), len(members)))
-            columns.append(np.tile(members, len(block)))
-            values.append(block.ravel())
-            main_conditions.append(main[: len(block)])
-            count += len(block)
-        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return csr_array(coo_array(entries, shape=(count, len(nodes)))), np.concatenate(main_conditions)
+        matrix = csr_array(vstack([identity[single], *rows], format="csr"))
+        return matrix, np.concatenate([single, *main_conditions])
 
     def _combinations_across(
         self, conditions: Conditions, interface: PeriodicInterface, at_first: Indices, at_second: Indices
@@ -196,15 +191,15 @@ class Wave:
         return np.asarray(vectors[:, strength > 0.5].conj().T)
 
 
-def without_ends(model: Model, sectors: Sectors) -> Model:
-    """Return the model without the constraints between the ends of its sector."""
+def open_sector(model: Model, sectors: Sectors) -> Model:
+    """Return a model without the constraints between the ends of its sector."""
     open_model = copy.copy(model)
     ends = [interface.relation for interface in sectors.periodic_interfaces]
     open_model.relations = [item for item in model.relations if not any(item is end for end in ends)]
     return open_model
 
 
-def pairs_of(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tuple[Array, AnyArray]:
+def complex_eigenpairs(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tuple[Array, AnyArray]:
     """Return the n lowest eigenvalues (n,) and complex vectors (size, n) in the span of real forms (2 size, k).
 
     In the real form each pair appears twice, shifted by a quarter of a wave, or once if an iteration has missed its twin;

@@ -31,7 +31,7 @@ UNSTABLE = (
 )
 
 
-def lowest(
+def lowest_eigenpairs(
     solver: LinearSolver, matrices: tuple[bsr_array, bsr_array], near_nullspace: Array, free: Mask,
     n: int, shift: float,
 ) -> tuple[Array, Array]:  # fmt: skip
@@ -80,7 +80,7 @@ def lowest(
 
 
 def _dense_eigenpairs(K: bsr_array, M: bsr_array, free: Indices, n: int, shift: float) -> tuple[Array, Array]:
-    """Return the result of `lowest` for few unknowns `free` (k,), by a dense eigenvalue problem."""
+    """Return the result of `lowest_eigenpairs` for few unknowns `free` (k,), by a dense eigenvalue problem."""
     dense_K, dense_M = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
     try:  # for the inverse eigenvalues, since M may be singular
         inverse, modes = eigh(dense_M, dense_K + shift * dense_M, subset_by_index=[len(free) - n, len(free) - 1])
@@ -183,11 +183,11 @@ def _pivots_and_weights(rows: csr_array, nodes: Indices, size: int) -> tuple[Ind
     try:
         elimination = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)
     except DependenceError:
-        return _by_qr(rows)
+        return _pivots_by_qr(rows)
     return elimination.pivots, elimination.full_weights()
 
 
-def _by_qr(rows: csr_array) -> tuple[Indices, csr_array]:
+def _pivots_by_qr(rows: csr_array) -> tuple[Indices, csr_array]:
     """Return the result of `_pivots_and_weights` for linearly dependent equations, by a dense QR factorisation."""
     columns = np.unique(rows.indices)
     _, R, order = qr(rows[:, columns].toarray(), mode="economic", pivoting=True)

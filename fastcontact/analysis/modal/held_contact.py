@@ -6,7 +6,7 @@ Computational Contact Mechanics, 2006, section 5.3). Penalties are springs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,12 +75,10 @@ class HeldContact:
         return K
 
 
-def joined(
-    held: Sequence[Conditions], n_dofs: int, join: Callable[[Conditions], Conditions] = lambda conditions: conditions
-) -> HeldContact:
-    """Return all conditions together, for `n_dofs` displacements; `join` may first map each to those of a whole ring."""
+def assembled(all_conditions: Iterable[Conditions], n_dofs: int) -> HeldContact:
+    """Return all conditions together, for `n_dofs` displacements."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
-    for conditions in map(join, held):
+    for conditions in all_conditions:
         nonempty = np.flatnonzero(np.diff(conditions.rows.indptr) > 0)
         if conditions.compliance is None:
             equations.append(csr_array(conditions.rows[nonempty]))

@@ -16,7 +16,7 @@ from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.modal.cyclic import Sectors
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity import recovery
-from fastcontact.elasticity.material_axes import rotations
+from fastcontact.elasticity.material_axes import rotated_stress
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
@@ -165,14 +165,14 @@ class Modes(Shapes):
         return RingModes(self, self._sectors)
 
     def __repr__(self) -> str:
-        rows = [self._columns, *self._rows("{:.6g}")]
+        rows = [self._columns, *self._rows()]
         widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
         lines = ["  ".join(text.rjust(width) for text, width in zip(row, widths)) for row in rows]
         return "\n".join(lines + self.remarks())
 
     def _repr_html_(self) -> str:
         remarks = "".join(f"<p>{escape(remark)}</p>" for remark in self.remarks())
-        return html_table(self._rows("{:.6g}"), self._columns, "Modes") + remarks
+        return html_table(self._rows(), self._columns, "Modes") + remarks
 
     @property
     def _columns(self) -> tuple[str, ...]:
@@ -180,14 +180,14 @@ class Modes(Shapes):
         masses = (f"effective mass {axis}" for axis in "xyz"[: len(self.mass)])
         return ("mode", *ring_columns, "frequency", *masses)
 
-    def _rows(self, numbers: str) -> list[tuple[str, ...]]:
+    def _rows(self) -> list[tuple[str, ...]]:
         rows, masses_shown = [], np.where(self.effective_mass > ROUND_OFF * self.mass, self.effective_mass, 0.0)
         for k, (f, masses) in enumerate(zip(self.frequencies, masses_shown)):
             ring_columns: tuple[str, ...] = ()
             if self.nodal_diameters is not None and self.twins is not None:
                 twin = "" if self.twins[k] == k else str(self.twins[k] + 1)
                 ring_columns = (str(self.nodal_diameters[k]), twin)
-            rows.append((str(k + 1), *ring_columns, *(numbers.format(value) for value in (f, *masses))))
+            rows.append((str(k + 1), *ring_columns, *(f"{value:.6g}" for value in (f, *masses))))
         return rows
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -252,12 +252,5 @@ class RingModes(Shapes):
             angle = 2.0 * math.pi * d * k / self._sectors.number
             real, imaginary = math.cos(angle), -sign * math.sin(angle)
             u.append((real * mode.displacement + imaginary * twin_mode.displacement) @ rotation.T)
-            stress.append(_rotated_stress(real * mode.stress + imaginary * twin_mode.stress, rotation))
+            stress.append(rotated_stress(real * mode.stress + imaginary * twin_mode.stress, rotation))
         return _mode_step(number, modes.frequencies[number], np.concatenate(u), np.concatenate(stress), modes._model)
-
-
-def _rotated_stress(stress: Array, rotation: Array) -> Array:
-    """Return stresses (n, 4 or 6) of a body rotated by a rotation matrix (dim, dim) [pressure]."""
-    Q, size = np.eye(3), stress.shape[1]
-    Q[: len(rotation), : len(rotation)] = rotation
-    return np.asarray(stress @ rotations(Q.T[None])[0, :size, :size].T)

@@ -36,7 +36,7 @@ class Gradient:
     multiplier : ndarray (k,)
         Derivative with respect to the multipliers of active constraints [unit of the quantity / force].
     sample : ndarray, optional
-        Derivative with respect to `MovingContact.at`, which depends on the pairing; None for zero.
+        Derivative with respect to `MovingContact.sample_at`, which depends on the pairing; None for zero.
     reaction : ndarray (n_dofs,), optional
         Derivative with respect to the forces of supports [unit of the quantity / force]; None for zero.
     """
@@ -59,7 +59,7 @@ class Change:
     lift : ndarray (n_dofs,)
         Derivative of the prescribed displacements [length / unit of the parameter].
     sample : ndarray
-        Derivative of `MovingContact.at` [its unit / unit of the parameter].
+        Derivative of `MovingContact.sample_at` [its unit / unit of the parameter].
     """
 
     residual: Array
@@ -75,7 +75,7 @@ class Adjoint:
     contact : MovingContact
     gradient : Gradient
     moving : csr_array
-        Derivative of `MovingContact.at` with respect to the configuration at which surfaces are paired; see
+        Derivative of `MovingContact.sample_at` with respect to the configuration at which surfaces are paired; see
         `MovingContact.derivatives`.
     """
 
@@ -125,14 +125,14 @@ class Adjoint:
 
     def _solve(self) -> tuple[Array, Array]:
         right_side, multiplier = self._right_side()
-        w, mu = self._solve_transposed(right_side, multiplier)
-        pairing_terms = self._transposed(w, mu)
+        w, mu = self._saddle_point_solution(right_side, multiplier)
+        pairing_terms = self._pairing_product(w, mu)
         if not pairing_terms.any():
             return w, mu
         zero = np.zeros(self._k)
 
         def product(s: Array) -> Array:
-            return s + self._transposed(*self._solve_transposed(s, zero))
+            return s + self._pairing_product(*self._saddle_point_solution(s, zero))
 
         n = len(right_side)
         operator = LinearOperator((n, n), product)
@@ -142,16 +142,16 @@ class Adjoint:
                 f"the adjoint equations of the moving contact geometry do not converge in {self.solutions} solutions: "
                 "keep the pairing (Criteria(keep_pairing=True)), or use finite differences of two solutions"
             )
-        return self._solve_transposed(right_side - s, multiplier)
+        return self._saddle_point_solution(right_side - s, multiplier)
 
-    def _solve_transposed(self, right_side: Array, multiplier: Array) -> tuple[Array, Array]:
-        """Return ``J0^-T`` applied to right-hand sides (n,) and (k,), by the linear solver of the analysis."""
+    def _saddle_point_solution(self, right_side: Array, multiplier: Array) -> tuple[Array, Array]:
+        """Return ``J0^-T`` applied to right-hand sides (n,) and (k,), by one solution of the linear solver."""
         self.solutions += 1
         loaded = self._solver.load(np.ascontiguousarray(right_side))
         w, force = loaded.solve(self._rows, -multiplier, self._C)
         return w, -force
 
-    def _transposed(self, w: Array, mu: Array) -> Array:
+    def _pairing_product(self, w: Array, mu: Array) -> Array:
         """Return ``E.T y`` (n,)."""
         system, bodies = self._system, self._contact.problem.floating_bodies
         product = self._gap.T @ mu - self._force.T @ (w if system.T is None else system.T @ w)

@@ -83,8 +83,8 @@ class MovingContact:
         """Return the constraints of surfaces paired at displacements u (n_dofs,) [length]."""
         return pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
 
-    def at(self, u: Array) -> Array:
-        """Return forces, gaps and pressures for the pairing at u (n_dofs,), while displacements stay `self.u` [length].
+    def sample_at(self, u: Array) -> Array:
+        """Return forces, gaps and pressures for surfaces paired at u (n_dofs,), at the displacements `self.u` [length].
 
         The result contains the nodal contact forces (n_dofs,) [force], then the gaps (k,) of the active constraints with
         their compliance [length], then the nodal pressures (n_nodes,) of the pair if they are requested.
@@ -107,13 +107,14 @@ class MovingContact:
             return np.empty(0)
         constraints = constraints or self.constraints
         assert self.closed is not None
-        part = constraints.parts[self.pair]
-        forces = part.normal_forces(part.contact_forces(multiplier[constraints.rows[self.pair]]))
-        return closed_node_pressures(part, forces, self.closed, self.problem.pairs[self.pair].secondary)[1]
+        pair = constraints.parts[self.pair]
+        forces = pair.normal_forces(pair.contact_forces(multiplier[constraints.rows[self.pair]]))
+        return closed_node_pressures(pair, forces, self.closed, self.problem.pairs[self.pair].secondary)[1]
 
     def parameter_derivative(self, modified: Callable[[float], MovingContact], increment: float) -> Array:
-        """Return the derivative of `at` with respect to a parameter, which `modified(d)` increases by d."""
-        return np.asarray((modified(increment).at(self.u) - modified(-increment).at(self.u)) / (2.0 * increment))
+        """Return the derivative of `sample_at` with respect to a parameter, which `modified(d)` increases by d."""
+        forward, backward = (modified(d).sample_at(self.u) for d in (increment, -increment))
+        return (forward - backward) / (2.0 * increment)
 
     @cached_property
     def increment(self) -> float:
@@ -128,7 +129,7 @@ class MovingContact:
         return [side for pair in pairs for side in (pair.secondary, pair.primary) if isinstance(side, Surface)]
 
     def derivatives(self, lifts: Sequence[Array]) -> tuple[csr_array, csr_array]:
-        """Return forward and backward derivatives (n, n_dofs + q) of `at` with respect to the paired configuration.
+        """Return forward and backward derivatives (n, n_dofs + q) of `sample_at` with respect to its argument.
 
         The first columns belong to the unknowns of the system. The others belong to the q `lifts` (n_dofs,), divided by their
         largest component. Points are only moved as the supports allow: if both sides end in a plane of symmetry, a point that
@@ -173,7 +174,7 @@ class MovingContact:
 
     @cached_property
     def _pattern(self) -> csr_array:
-        """Pattern (n, n_points) of the derivatives of `at`: the points on whose unknowns each value may depend.
+        """Pattern (n, n_points) of the derivatives of `sample_at`: the points on whose unknowns each value may depend.
 
         Forces on obstacles are omitted, which may depend on all points.
         """
@@ -203,7 +204,7 @@ class MovingContact:
 
     def _differences(self, groups: list[Indices]) -> tuple[csr_array, csr_array]:
         """Return the forward and backward derivatives (n, n_dofs), given groups of unknowns that are moved simultaneously."""
-        dim, n, size = self.problem.model.mesh.dim, len(self.u), len(self._base)
+        dim, n, size = self.problem.model.mesh.dim, len(self.u), len(self.sample)
         sums = [csr_array((size, n)), csr_array((size, n))]
         for dofs in groups:
             unknowns = np.zeros(n)
@@ -216,20 +217,21 @@ class MovingContact:
         return sums[0], sums[1]
 
     @cached_property
-    def _base(self) -> Array:
-        return self.at(self.u)
+    def sample(self) -> Array:
+        """Forces, gaps and pressures at the displacements of the step, see `sample_at`."""
+        return self.sample_at(self.u)
 
     def _one_sided(self, motion: Array) -> tuple[Array, Array]:
-        """Return the forward and the backward derivative of `at` along a motion (n_dofs,) of the points."""
+        """Return the forward and the backward derivative of `sample_at` along a motion (n_dofs,) of the points."""
         increment = self.increment / (largest(motion) or 1.0)
 
         def at(distance: float) -> Array:
             shift = distance * motion
             # Displacements of force-driven obstacles that are prescribed are taken from the load.
             load = replace(self.load, lift=self.load.lift + np.where(self.problem.system.fixed, shift, 0.0))
-            return replace(self, load=load).at(self.u + shift)
+            return replace(self, load=load).sample_at(self.u + shift)
 
-        return (at(increment) - self._base) / increment, (self._base - at(-increment)) / increment
+        return (at(increment) - self.sample) / increment, (self.sample - at(-increment)) / increment
 
     def _is_consistent(self, derivative: csr_array, dofs: Indices) -> bool:
         """Return whether the derivative agrees with that along a direction in which all points move."""

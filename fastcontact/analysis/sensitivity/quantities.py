@@ -41,7 +41,7 @@ def check_quantity(model: Model, quantity: Label) -> None:
 
 
 def with_gradient(contact: MovingContact, step: StepResult, quantity: Label) -> tuple[MovingContact, Gradient]:
-    """Return the contact, whose values `at` include the pressures of a pair if the quantity is one, and its gradient.
+    """Return the gradient of a quantity, and the contact, whose sample contains pressures if the quantity is a pressure.
 
     `check_quantity` must have accepted the quantity. Raises ModelError if it has no sensitivities in this state.
     """
@@ -83,7 +83,7 @@ def _reaction(contact: MovingContact, zero: Gradient, quantity: Label) -> Gradie
     balance = contact.problem.system.balance(unit_displacement)[0]
     if not balance.any():
         raise ModelError(f"no support acts along {quantity[-1]} on group '{quantity[1]}': its reaction is zero")
-    force = contact.at(contact.u)[: len(contact.u)] if contact.problem.pairs else 0.0
+    force = contact.sample[: len(contact.u)] if contact.problem.pairs else 0.0
     residual = contact.problem.system.K @ contact.u - contact.load.force - force
     return replace(zero, value=float(balance @ residual), reaction=balance)
 

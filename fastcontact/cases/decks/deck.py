@@ -13,7 +13,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import html_table
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.result_warnings import largest_rotation
+from fastcontact.analysis.result_warnings import largest_rotation, largest_strain
 from fastcontact.analysis.resultants import multipliers
 from fastcontact.analysis.run import solve_steps
 from fastcontact.arrays import Array, Numbers
@@ -21,7 +21,6 @@ from fastcontact.cases.decks.blocks import Location, key_of, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.keywords import read_content
-from fastcontact.elasticity import recovery
 from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
 from fastcontact.mesh.mesh import ROTATION
@@ -206,15 +205,11 @@ class Deck:
         """Warn, with the largest equivalent strain and rotation, if the deck has NLGEOM but small strains were assumed."""
         if not self.building.small_strain_cause:
             return
-        field, largest = self.model.material_field(), 0.0
-        for name, cells in self.model.mesh.solids.items():
-            strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[cells])
-            largest = max(largest, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max()))
         nonlinear = next(s for s in self.building.content.steps if s.nonlinear)
-        angle, _ = largest_rotation(self.model.mesh, step.displacement)
+        strain, (angle, _) = largest_strain(self.model, step), largest_rotation(self.model.mesh, step.displacement)
         warn(
             f"{nonlinear.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
-            f"{largest:.3g} and the rotation up to {angle:.3g} rad, whose squares linear kinematics neglect"
+            f"{strain:.3g} and the rotation up to {angle:.3g} rad, whose squares linear kinematics neglect"
         )
 
 

@@ -97,8 +97,8 @@ def contact_map(
         labels = ("across the contact", "up the contact")
     known = [name for name in SECOND_FIELDS if getattr(contact, name) is not None]
     check_known("field beside the pressure", beside, known, FastcontactError)
-    caption, quantity, beside_values = *SECOND_FIELDS[beside], getattr(contact, beside)
-    size = np.linalg.norm(beside_values.reshape(len(flat), -1), axis=1)
+    caption, quantity, second_values = *SECOND_FIELDS[beside], getattr(contact, beside)
+    size = np.linalg.norm(second_values.reshape(len(flat), -1), axis=1)
     two_maps = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0))
     panels = _panels(axes, two_maps)
     fields = [(contact.pressure, "contact pressure", "pressure"), (size, caption, quantity)]
@@ -112,9 +112,9 @@ def contact_map(
         x_label, y_label = (axis_label(label, units, "length") for label in labels)
         ax.set(xlabel=x_label, ylabel=y_label, aspect="equal")
         ax.set_title(f"{caption}\nlargest {value_text(values.max(initial=0.0), units, quantity)}", fontsize="medium")
-    if two_maps and beside_values.ndim == 2:
+    if two_maps and second_values.ndim == 2:
         large = size > 0.1 * size.max()  # the direction of small vectors is not shown
-        panels[1].quiver(*flat[large].T, *(beside_values @ basis.T)[large].T, color="white", width=0.004, pivot="tail")
+        panels[1].quiver(*flat[large].T, *(second_values @ basis.T)[large].T, color="white", width=0.004, pivot="tail")
     if axes is None:
         panels[0].figure.set_figheight(1.6 + 3.0 * relative_height)
     panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")

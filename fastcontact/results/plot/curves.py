@@ -11,6 +11,7 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import PressureCurve, author, pressure_curve
 from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.elasticity.material_axes import rotated_stress
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
@@ -297,7 +298,8 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
     body_side = _body_sides(mesh, nodes, origin, direction)
     side = np.where(np.abs(height) > tolerance, np.sign(height), body_side).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
-    return np.abs(height)[order], side[order], _rotated_stress(step.stress[nodes], direction)[order]
+    axes = np.array([[direction[1], -direction[0]], direction])
+    return np.abs(height)[order], side[order], rotated_stress(step.stress[nodes], axes)[order]
 
 
 def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
@@ -310,14 +312,6 @@ def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
     axis = int(np.argmax(np.abs(normal)))
     direction = np.eye(2)[axis] if abs(normal[axis]) > 0.999 else normal * np.sign(normal[axis])
     return contact.coordinates[nearest], direction
-
-
-def _rotated_stress(stress: Array, direction: Array) -> Array:
-    """Return the stress (n, 4) in rotated axes, y along the `direction` (2,) and x normal to it [pressure]."""
-    x, y = np.array([direction[1], -direction[0]]), direction
-    tensor = stress[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
-    xx, yy, xy = (np.einsum("i,nij,j->n", a, tensor, b) for a, b in ((x, x), (y, y), (x, y)))
-    return np.column_stack([xx, yy, stress[:, 2], xy])
 
 
 def _body_sides(mesh: Mesh, nodes: AnyArray, origin: Array, direction: Array) -> Array:

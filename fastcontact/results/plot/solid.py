@@ -111,8 +111,10 @@ def _cross(a: Array, b: Array) -> Array:
 MOST_EDGES = 5000
 # Number of subdivisions of the sides of each flat triangle of a linear facet, for fields that are not linear within it.
 CUTS = 2
-# Largest number of recursive subdivisions of partly hidden triangles into four.
+# Largest number of recursive subdivisions of partly hidden triangles into four, and of partly hidden strokes into two.
 SUBDIVISIONS = 4
+# Barycentric weights of the ends of the halves of a stroke.
+HALF_STROKES = np.array([[[1.0, 0.0], [0.5, 0.5]], [[0.5, 0.5], [0.0, 1.0]]])
 # Size of solids relative to the axes, smaller than 1 to leave space for labels.
 ROOM = 0.9
 # Largest ratio of the longer extent of a box on the screen to its diagonal. Boxes with a larger ratio are drawn smaller.
@@ -145,20 +147,18 @@ def draw_solid(
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     facing, screen = _facing_facets(plot_field, points, viewer_direction(view))
-    pieces, values, strokes = [], [], []
-    for name, corners, field, flat in facing:
+    pieces, strokes = [], []
+    for name, corners, flat in facing:
         weights = _subdivision(CUTS if elements.get(name).order == 1 else 1)
-        triangles = np.einsum("pcw,ftwd->ftpcd", weights, corners[:, flat]).reshape(-1, 3, 3)
-        corner_values = np.einsum("pcw,ftw->ftpc", weights, field[:, flat]).reshape(-1, 3)
-        visible, visible_values = _visible_parts(triangles, corner_values, screen)
-        pieces.append(visible)
-        values.append(visible_values.mean(axis=1))
-        strokes.append(_visible_strokes(_outline(name, corners), screen))
+        flat_pieces = np.einsum("pcw,ftwd->ftpcd", weights, corners[:, flat]).reshape(-1, 3, 4)
+        pieces.append(_visible_parts(flat_pieces, _subdivision(2), screen))
+        strokes.append(_visible_parts(_outline(name, corners[..., :3]), HALF_STROKES, screen))
+    triangles = np.concatenate(pieces)
     norm = Normalize(*limits)
-    faces = colormaps[plot_field.colours](norm(np.concatenate(values)))
-    polygons = list(np.concatenate(pieces))
+    faces = colormaps[plot_field.colours](norm(triangles[..., 3].mean(axis=1)))
+    polygons = list(triangles[..., :3])
     lines = faces.copy()  # lines in the colour of the face close hairline gaps between faces
-    if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
+    if edges if edges is not None else sum(len(corners) for _, corners, _ in facing) <= MOST_EDGES:
         # Matplotlib draws nearer objects later. Strokes are moved towards the viewer, which does not change their projection.
         moved = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * viewer_direction(view)
         polygons += list(moved)
@@ -225,56 +225,39 @@ def viewer_direction(view: tuple[float, float]) -> Array:
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
 
 
-def _facing_facets(
-    plot_field: Field, points: Array, eye: Array
-) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
+def _facing_facets(plot_field: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Indices]], Screen]:
     """Return the facets that face the viewer, and the screen with their triangles.
 
-    For each element type of facets there are its name, the positions and values at the nodes of the facets, and the local
-    nodes of the flat triangles of a facet.
+    For each element type of facets there are its name, the positions and values (n, n_nodes, 4) at the nodes of the facets,
+    and the local nodes of the flat triangles of a facet.
     """
     mesh, node = plot_field.mesh, plot_field.node
     cut = len(node) != node.max(initial=-1) + 1
-    facing = []
+    data, facing = np.column_stack([points, plot_field.values]), []
     for name, facets in (_facets_without_cuts(mesh, node) if cut else outer_facets(mesh)).items():
         flat = flat_triangles(facets.shape[1])
         a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
-        visible = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
-        facing.append((name, points[visible], plot_field.values[visible], flat))
-    triangles = [corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]
+        facing.append((name, data[facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]], flat))
+    triangles = [corners[:, flat, :3].reshape(-1, 3, 3) for _, corners, flat in facing]
     return facing, Screen(np.concatenate(triangles), eye)
 
 
-def _visible_parts(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
-    """Return the visible parts of triangles (n, 3, 3) and the values (n, 3) at their corners.
+def _visible_parts(simplices: Array, parts: Array, screen: Screen) -> Array:
+    """Return the visible parts (m, k, d) of triangles or strokes (n, k, d), whose first three components are positions.
 
-    Partly hidden triangles are divided recursively into four. The smallest triangles are kept if their centre is visible.
+    Partly hidden ones are divided recursively into p parts, whose corners have the barycentric weights `parts` (p, k, k). The
+    smallest parts are kept if their centre is visible.
     """
-    visible: list[tuple[Array, Array]] = []
+    visible = []
     for n_subdivisions in range(SUBDIVISIONS, -1, -1):
-        centre = triangles.mean(axis=1, keepdims=True)
-        tests = np.concatenate([centre, centre + 0.98 * (triangles - centre)], axis=1)
-        hidden = screen.hidden(tests)
+        positions = simplices[..., :3]
+        centre = positions.mean(axis=1, keepdims=True)
+        hidden = screen.hidden(np.concatenate([centre, centre + 0.98 * (positions - centre)], axis=1))
         is_visible = ~hidden[:, 0] if n_subdivisions == 0 else ~hidden.any(axis=1)
-        visible.append((triangles[is_visible], values[is_visible]))
-        partly_hidden = ~is_visible & ~hidden.all(axis=1)
-        if n_subdivisions == 0 or not partly_hidden.any():
-            break
-        weights = _subdivision(2)
-        triangles = np.einsum("pcw,nwd->npcd", weights, triangles[partly_hidden]).reshape(-1, 3, 3)
-        values = np.einsum("pcw,nw->npc", weights, values[partly_hidden]).reshape(-1, 3)
-    return np.concatenate([block for block, _ in visible]), np.concatenate([block for _, block in visible])
-
-
-def _visible_strokes(strokes: Array, screen: Screen) -> Array:
-    """Return the visible parts of strokes (n, 2, 3); partly hidden strokes are divided into sixteen pieces."""
-    ends = np.linspace(0.0, 1.0, 17)[:, None]
-    points = strokes[:, None, 0] + ends * (strokes[:, None, 1] - strokes[:, None, 0])
-    segments = np.stack([points[:, :-1], points[:, 1:]], axis=2)
-    hidden = screen.hidden(segments.mean(axis=2))
-    visible = ~hidden.any(axis=1)
-    partly = ~visible & ~hidden.all(axis=1)
-    return np.concatenate([strokes[visible], segments[partly][~hidden[partly]]])
+        visible.append(simplices[is_visible])
+        partly_hidden = simplices[~is_visible & ~hidden.all(axis=1)]
+        simplices = np.einsum("pcw,nwd->npcd", parts, partly_hidden).reshape(-1, *simplices.shape[1:])
+    return np.concatenate(visible)
 
 
 def _facets_without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:

@@ -9,7 +9,7 @@ from models import made_of, supported, united
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
-from fastcontact.analysis.locking import SUSPICIOUS, Comparison, locking_warning
+from fastcontact.analysis.locking import SUSPICIOUS, ExcessStiffness, locking_warning
 from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.mesh import elements
@@ -79,7 +79,7 @@ def test_elements_without_remedy_are_told_with_a_figure_of_the_right_size(name, 
 def test_no_word_where_nothing_locks(name):
     assert np.isnan(solved(clamped(name, 0.3, "plain"))[1])
     assert np.isnan(solved(clamped(name, 0.499, "plain", "plane_stress"))[1])
-    assert Comparison(clamped(name, SUSPICIOUS - 0.01)).elements == []
+    assert ExcessStiffness(clamped(name, SUSPICIOUS - 0.01)).elements == []
 
 
 @pytest.mark.parametrize(
@@ -172,8 +172,8 @@ def test_a_released_part_is_not_judged_by_its_residual_stress(n):
 @pytest.mark.parametrize("name", ["quad4", "tri3", "tri6"])
 def test_the_surplus_is_a_stiffness(name, kinematics):
     model = clamped(name, 0.499, "plain", kinematics, n=2)
-    comparison, shape = Comparison(model), model.mesh.points.shape
-    S = np.column_stack([comparison.force(unit.reshape(shape)).ravel() for unit in np.eye(model.n_dofs)])
+    excess, shape = ExcessStiffness(model), model.mesh.points.shape
+    S = np.column_stack([excess.force(unit.reshape(shape)).ravel() for unit in np.eye(model.n_dofs)])
     assert np.abs(S - S.T).max() < 1e-12 * np.abs(S).max()
     assert np.linalg.eigvalsh(S).min() > -1e-12 * np.abs(S).max()
     if name == "quad4":  # what the averaged element does not have
@@ -181,6 +181,21 @@ def test_the_surplus_is_a_stiffness(name, kinematics):
         K = stiffness(model.mesh, kinematics, moduli, material)
         averaged = stiffness(model.mesh, kinematics, moduli, material, averaged=np.array([True]))
         assert np.abs(S - (K - averaged).toarray()).max() < 1e-10 * np.abs(S).max()
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_an_alternating_mean_stress_is_reported_where_the_excess_of_stiffness_is_small():
+    model = fc.Model(fc.generate.half_spheres(size=6.0), "plane_strain")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.46))
+    supported(model, A1A2="x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=2.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    texts = [text for text in fc.solve(model, 1)[-1].warnings if "cells lock" in text]
+    assert len(texts) == 1
+    assert texts[0].startswith(
+        "tri3 cells lock: at nu = 0.46 their mean stress scatters by 49% about its averages at the nodes"
+    )
 
 
 @pytest.mark.parametrize("linear_solver", ["direct", "amg"])
