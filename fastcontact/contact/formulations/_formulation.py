@@ -269,7 +269,8 @@ class Formulation(ABC):
     @cached_property
     def _initial_gaps(self) -> tuple[Array, Array]:
         """Positions (m, dim) and gaps (m,) of the constraints between the undeformed bodies [length]."""
-        constraints = self.unilateral(Configuration.undeformed(self.points))
+        undeformed = Configuration.undeformed(self.points)
+        constraints = self.unilateral(replace(undeformed, clearance_factor=self.options.initial_clearance_factor))
         return constraints.positions, constraints.gap0
 
     @cached_property
