@@ -2,14 +2,16 @@
 
     python bench/random_models.py [--count 2000] [--first 0] [--workers 1] [--limit 120] [--json FILE]
     python bench/random_models.py --seed 137 --show
+    python bench/random_models.py --law adhesion [...]
 
 Each seed determines a model (tests/random_models): in 2D or 3D, with one to three contact pairs, any element, materials of
 any contrast, moving and rotating rigid obstacles, clearances, friction, shifted, rotated, graded and partly covered meshes,
 cyclic sectors and periods, plates, orthotropic rings, bolts, couplings and heat. The script checks the invariants of each
 result (tests/mechanics.py), and compares it with the result of an equivalent model (rotated, renumbered, or with supports
 along normals, along axes, or as multi-point constraints). The outcome "told" is a result that fails a check and has a warning
-about it. The script prints the numbers of models by dimension, formulation, equivalent model and outcome, the errors by their
-first words, and the seeds of all findings; the exit code is 1 if there are findings.
+about it. With --law, all pairs have this interface law (tests/random_models/laws.py). The script prints the numbers of models
+by dimension, formulation, equivalent model and outcome, the errors by their first words, and the seeds of all findings; the
+exit code is 1 if there are findings.
 """
 
 from __future__ import annotations
@@ -32,21 +34,21 @@ for folder in ("tests", "tests/random_models"):
 FINDINGS = ("failed check", "raw error", "too long", "process died")
 
 
-def work(pipe: Any) -> None:
+def work(pipe: Any, law: str) -> None:
     """Receive seeds from a pipe and send the outcomes of their models, until None is received."""
     from outcome import outcome
 
     while (seed := pipe.recv()) is not None:
-        pipe.send(outcome(seed))
+        pipe.send(outcome(seed, law))
 
 
 class Worker:
     """A process that solves one model at a time."""
 
-    def __init__(self) -> None:
+    def __init__(self, law: str) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, other = context.Pipe()
-        self.process = context.Process(target=work, args=(other,), daemon=True)
+        self.process = context.Process(target=work, args=(other, law), daemon=True)
         self.process.start()
         other.close()
         self.seed, self.begin = -1, 0.0
@@ -71,10 +73,10 @@ class Worker:
         self.process.join()
 
 
-def rows(seeds: list[int], workers: int, limit: float) -> Iterator[dict[str, Any]]:
+def rows(seeds: list[int], workers: int, limit: float, law: str) -> Iterator[dict[str, Any]]:
     """Yield the outcomes of all seeds, in the order in which the models are finished."""
     waiting = seeds[::-1]
-    pool = [Worker() for _ in range(min(workers, len(seeds)))]
+    pool = [Worker(law) for _ in range(min(workers, len(seeds)))]
     for worker in pool:
         worker.give(waiting.pop())
     while pool:
@@ -86,7 +88,7 @@ def rows(seeds: list[int], workers: int, limit: float) -> Iterator[dict[str, Any
             if row["outcome"] in ("process died", "too long"):
                 worker.end()
                 pool.remove(worker)
-                worker = Worker() if waiting else worker
+                worker = Worker(law) if waiting else worker
                 pool += [worker] if waiting else []
             if waiting:
                 worker.give(waiting.pop())
@@ -150,7 +152,7 @@ def summary(results: list[dict[str, Any]]) -> str:
     return "\n\n".join([*parts, "\n".join(lines), "largest: " + ", ".join(worst), "\n".join(findings)])
 
 
-def show(seed: int) -> None:
+def show(seed: int, law: str) -> None:
     """Print the description of a model and its outcome."""
     from drawing import drawn
     from outcome import outcome
@@ -162,7 +164,7 @@ def show(seed: int) -> None:
             print(pair)
     except Exception:
         traceback.print_exc()
-    for name, value in outcome(seed).items():
+    for name, value in outcome(seed, law).items():
         print(f"{name:>14} {value}")
 
 
@@ -174,15 +176,16 @@ def main() -> int:
     parser.add_argument("--show", action="store_true", help="print the models, and solve them in this process")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--limit", type=float, default=120.0, help="seconds for one model")
+    parser.add_argument("--law", default="", help="interface law of all pairs, such as adhesion")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     seeds = options.seed or list(range(options.first, options.first + options.count))
     if options.show:
         for seed in seeds:
-            show(seed)
+            show(seed, options.law)
         return 0
     begin, results = time.perf_counter(), []
-    for row in rows(seeds, options.workers, options.limit):
+    for row in rows(seeds, options.workers, options.limit, options.law):
         results.append(row)
         if row["outcome"] in FINDINGS:
             print(f"seed {row['seed']}: {row['outcome']}: {row['text'][:200]}", flush=True)

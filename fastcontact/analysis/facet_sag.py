@@ -22,7 +22,7 @@ from fastcontact.contact.integration import fine_rule, gauss_rule
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.projection import nodal_normals
-from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.results.step import ContactResult, StepResult
@@ -98,14 +98,9 @@ def _inclination(pair: Formulation, configuration: Configuration, contact: Conta
     )
 
 
-def _lengths(block: FacetBlock, points: Array) -> Array:
-    """Return the lengths (n_facets,) of the facets of a block [length]."""
-    return np.linalg.norm(np.ptp(points[block.facets], axis=1), axis=1)
-
-
 def facet_length(side: Surface, points: Array) -> float:
-    """Return the median length of the facets of a side, for coordinates `points` (n_points, dim) [length]."""
-    return float(np.median(np.concatenate([_lengths(block, points) for block in side.blocks])))
+    """Return the median diameter of the facets of a side, for coordinates `points` (n_points, dim) [length]."""
+    return float(np.median(np.concatenate([block.diameters(points) for block in side.blocks])))
 
 
 def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple[float, float]:
@@ -139,7 +134,7 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     if pair.secondary.order == 2:
         return spread, spread / facet_length(pair.secondary, pair.points)
     blocks = zip(pair.secondary.blocks, rules, strict=True)
-    weights = [np.outer(_lengths(block, pair.points), w).ravel() for block, (_, w) in blocks]
+    weights = [np.outer(block.diameters(pair.points), w).ravel() for block, (_, w) in blocks]
     return spread, max(offset, _slope(pair, points, np.concatenate(weights), sag, closed))
 
 
@@ -156,7 +151,7 @@ def _slope(pair: Formulation, points: Candidates, weights: Array, sag: Array, cl
     sums = np.bincount(nodes, (portions * np.nan_to_num(sag)[:, None]).ravel(), n)
     mean = np.divide(sums, total, out=np.full(n, np.nan), where=total > 0.0)
     for block in pair.secondary.blocks:
-        slopes = np.ptp(mean[block.facets], axis=1) / _lengths(block, pair.points)
+        slopes = np.ptp(mean[block.facets], axis=1) / block.diameters(pair.points)
         largest = max(largest, float(np.nan_to_num(slopes[closed[block.facets].any(axis=1)]).max(initial=0.0)))
     return largest * (1.0 if pair.name == "node_to_segment" else MEAN_GAP_FACTOR)
 

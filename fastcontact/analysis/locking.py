@@ -41,7 +41,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
-from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SUM_ROUND_OFF
 
 # Poisson's ratio above which the mean stress is examined, and relative scatter of the mean stress, or of nodal pressures,
 # above which a warning is given. Under a sphere the mean stress scatters by 14 to 23 % at nu = 0.3, where the pressure is
@@ -89,7 +89,8 @@ def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Seq
     strain = 1.0 if model.strain == "finite" else np.abs(step.displacement).max() / size.max()
     # Root of the energy if the bounding box were filled with the stiffest material under this strain, or rotated.
     energy_scale = strain * np.sqrt(field.moduli.max() * np.prod(size))
-    if energy <= max(LENGTH_ROUND_OFF * energy_scale, np.sqrt(LENGTH_ROUND_OFF * largest_work)):
+    negligible_energy = max(LENGTH_ROUND_OFF * energy_scale, np.sqrt(LENGTH_ROUND_OFF * largest_work))
+    if strain <= SUM_ROUND_OFF or energy <= negligible_energy:
         return 0.0, 0.0
     ratio = float(difference / np.sqrt(energy**2 + 2.0 * plastic_work))
     if not plastic_work:  # a thin part may bend on a body that stores more energy

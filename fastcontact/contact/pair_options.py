@@ -56,6 +56,8 @@ class PairOptions:
         Temperature of a rigid obstacle that exchanges heat [temperature].
     cohesion : CohesiveLaw, optional
         Traction-separation law; None means that the pair has no tension.
+    initial_clearance_factor : float
+        Factor of the clearances in the initial state, in which a cohesive layer is free of stress [-].
     source : ndarray of bool (n_points,), optional
         Nodes at the source of a penetrating fluid; None without fluid.
     representatives : ndarray of int (n_points,), optional
@@ -79,6 +81,7 @@ class PairOptions:
     friction_heat: float = 0.0
     obstacle_temperature: float | None = None
     cohesion: CohesiveLaw | None = None
+    initial_clearance_factor: float = 1.0
     source: Mask | None = None
     representatives: Indices | None = None
     sector_rotation: Rotation | None = None

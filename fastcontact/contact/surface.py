@@ -40,6 +40,14 @@ class FacetBlock:
         """Line facets (n_facets, 2) of the block before and after each of its line facets; -1 if there is none."""
         return _line_neighbours(self.local)
 
+    def diameters(self, coordinates: Array) -> Array:
+        """Return the largest distance (n_facets,) between two nodes of each facet [length].
+
+        `coordinates` (n_points, dim) are those of all points of the mesh [length].
+        """
+        x = coordinates[self.facets]
+        return np.asarray(np.linalg.norm(x[:, :, None] - x[:, None], axis=3).max(axis=(1, 2)))
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:

@@ -104,11 +104,10 @@ def check_penetration(name: str, pair: Formulation) -> None:
 
 
 def facet_lengths(pair: Formulation) -> Array:
-    """Return the diagonal of the bounding box of the largest facet at each secondary node (n_nodes,) [length]."""
+    """Return the diameter of the largest facet at each secondary node (n_nodes,) [length]."""
     longest = np.zeros(len(pair.secondary.points))
     for block in pair.secondary.blocks:
-        diagonal = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
-        np.maximum.at(longest, block.local, diagonal[:, None])
+        np.maximum.at(longest, block.local, block.diameters(pair.points)[:, None])
     return longest
 
 

@@ -19,7 +19,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import Value, check_number, check_value, evaluated
 from fastcontact.errors import ContactError, check_known
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.ramp import History, table_of
+from fastcontact.model.ramp import History, table_of, table_value
 
 
 class FormulationOptions(TypedDict, total=False):
@@ -87,7 +87,7 @@ def pair_options(name: str, options: Mapping[str, Any], mesh: Mesh, side: Surfac
     _check_obstacle_temperature(name, options, has_obstacle)
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
-    table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
+    clearance_ramp = table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
     _check_friction_ramp(name, options)
     return PairOptions(
         _function(f"the clearance of contact '{name}'", options.get("clearance")),
@@ -104,6 +104,7 @@ def pair_options(name: str, options: Mapping[str, Any], mesh: Mesh, side: Surfac
         friction_heat=_friction_heat(name, options),
         obstacle_temperature=options.get("obstacle_temperature"),
         cohesion=_cohesion(name, options),
+        initial_clearance_factor=1.0 if clearance_ramp is None else table_value(clearance_ramp, 0.0),
     )
 
 

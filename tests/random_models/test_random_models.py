@@ -47,6 +47,18 @@ def test_layers_without_force_have_no_determined_position():
     check([310377])
 
 
+# Adhesion whose stiffness in compression depended on the directions of facets; laws of every kind.
+@pytest.mark.parametrize(
+    ("law", "seeds"),
+    [
+        ("adhesion", [620012, 620022]),
+        *((law, [610000, 610003]) for law in ("cohesion", "penalty", "tangential penalty", "wear", "friction ramp")),
+    ],
+)
+def test_random_models_with_interface_laws_end_right(law, seeds):
+    assert all(outcome(seed, law)["outcome"] == "result" for seed in seeds)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(1000, 1300, 50))
 def test_more_random_models_end_right(first):

@@ -75,6 +75,20 @@ def test_the_law_is_traced_exactly(options, element):
     assert damage == 1.0
 
 
+@pytest.mark.parametrize("options", FORMULATIONS)
+def test_a_clearance_with_a_ramp_opens_a_layer_as_a_motion_does(options):
+    """A constant clearance belongs to the initial gap, at which the layer is free of stress."""
+    model = glued(clearance=1.0, clearance_ramp=PATH.table, **options)
+    damage = 0.0
+    for step, moved in zip(fc.solve(model, fc.Ramp(PATH.instants, ((0, 0), (7, 0)))), (0.02, 0.04, 0.08, 0.04, -0.02)):
+        traction, opening, damage = exact(moved, damage)
+        assert abs(step.contact["glue"].force[-1] + 2.0 * traction) < 2e-9 * STRENGTH
+        assert np.abs(step.contact["glue"].gap - opening).max() < 1e-11
+    unmoved = fc.solve(glued(clearance=-0.3, **options), fc.Ramp((1,), ((0, 0), (1, 0))))[-1]
+    assert np.abs(unmoved.contact["glue"].pressure).max() < 1e-9
+    assert not unmoved.warnings
+
+
 @pytest.mark.parametrize("angle", [0.0, 30.0, 60.0, 90.0])
 def test_mixed_modes_take_the_energy_of_benzeggagh_and_kenane(angle):
     """Between stiff blocks: the largest traction and the energy at break, by the ratio of opening and sliding."""

@@ -120,8 +120,7 @@ class MovingContact:
     def increment(self) -> float:
         """Increment by which points are moved [length]."""
         points = self.problem.model.mesh.points
-        facets = [nodes for side in self._surfaces() for nodes in side.node_positions(points)]
-        sizes = [float(np.linalg.norm(np.ptp(nodes, axis=1), axis=1).min()) for nodes in facets]
+        sizes = [float(block.diameters(points).min()) for side in self._surfaces() for block in side.blocks]
         return DIFFERENCE_STEP * min(sizes, default=np.inf)
 
     def _surfaces(self) -> list[Surface]:

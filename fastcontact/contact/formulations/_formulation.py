@@ -269,15 +269,15 @@ class Formulation(ABC):
     @cached_property
     def _initial_gaps(self) -> tuple[Array, Array]:
         """Positions (m, dim) and gaps (m,) of the constraints between the undeformed bodies [length]."""
-        constraints = self.unilateral(Configuration.undeformed(self.points))
+        undeformed = Configuration.undeformed(self.points)
+        constraints = self.unilateral(replace(undeformed, clearance_factor=self.options.initial_clearance_factor))
         return constraints.positions, constraints.gap0
 
     @cached_property
     def shortest_edge(self) -> float:
-        """Length of the shortest facet, divided by the order of its shape functions [length]."""
-        blocks = zip(self.secondary.blocks, self.secondary.node_positions(self.points), strict=True)
-        lengths = [np.linalg.norm(np.ptp(x, axis=1), axis=1) / elements.get(block.element).order for block, x in blocks]
-        return float(np.concatenate(lengths).min())
+        """Smallest diameter of the facets, divided by the order of their shape functions [length]."""
+        blocks = self.secondary.blocks
+        return float(min(b.diameters(self.points).min() / elements.get(b.element).order for b in blocks))
 
     @cached_property
     def tied(self) -> TiedPair | None:

@@ -101,7 +101,7 @@ class MeshedSurface:
         closest = closest_of_types(points, nodes_by_type)
         pseudonormal, averaged, on_edge, on_border = self._closest_normals(closest)
         offset = points - closest.position
-        size = np.concatenate([np.linalg.norm(np.ptp(x, axis=1), axis=1) for x in nodes_by_type])[closest.facet]
+        size = np.concatenate([block.diameters(self.mesh.points) for block in self._facets.side.blocks])[closest.facet]
         # At touching points, the direction from the closest point is dominated by round-off, and the facet normal is used.
         is_touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
