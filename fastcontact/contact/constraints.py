@@ -357,12 +357,32 @@ class Constraints:
 
         Elastic slips are the tangential components of the product of compliance and forces.
         """
-        slips = self.tangential_softness[:, None] * tangential
+        slips = self.tangential_softness * tangential.T
         if self.compliance is not None:
-            axes = self.coupled_directions or self.directions
-            forces = multiplier[:, None] * normals(axes) + np.einsum("mk,kmd->md", tangential, np.stack(axes))
-            slips += np.einsum("md,kmd->mk", self.compliance.apply(forces), np.stack(axes))
-        return np.einsum("mk,kmd->md", slips, np.stack(self.directions))
+            slips += self._products_with_compliance(self.compliance, np.vstack([multiplier, tangential.T]))[1:]
+        return np.einsum("km,kmd->md", slips, np.stack(self.directions))
+
+    def coupled_gaps(self, forces: Array) -> Array:
+        """Return the gaps and slips (1 + k, m) due to the compliances that couple constraints under `forces` (1 + k, m)."""
+        gaps = np.einsum(
+            "amh,h->am", self.low_rank_compliance, np.einsum("amh,am->h", self.low_rank_compliance, forces)
+        )
+        return gaps if self.compliance is None else gaps + self._products_with_compliance(self.compliance, forces)
+
+    def _products_with_compliance(self, C: MultiplierCompliance, forces: Array) -> Array:
+        axes = self.compliance_axes
+        return np.einsum("md,amd->am", C.apply(np.einsum("am,amd->md", forces, axes)), axes)
+
+    @property
+    def compliance_axes(self) -> Array:
+        """Normals and tangents (1 + k, m, dim) along which C couples the components of force vectors [-].
+
+        The normals of constraints without friction are any unit vectors.
+        """
+        along = np.stack(self.coupled_directions or self.directions)
+        normal = normals(list(along))
+        normal[~along.any(axis=(0, 2)), 0] = 1.0
+        return np.concatenate([normal[None], along])
 
     @property
     def nodal_field(self) -> NodalField:

@@ -17,7 +17,6 @@ from scipy.sparse import csc_array, csr_array, diags_array, hstack
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.pairing import normals
 from fastcontact.linear.delassus import MAX_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded
 from fastcontact.linear.sparse_rows import scaled
@@ -155,10 +154,7 @@ def with_compliance(F: Delassus, constraints: Constraints, rows: Indices, compon
     if constraints.compliance is not None:
         # C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
         # directions, which vary from one constraint to the next.
-        along = np.stack(constraints.coupled_directions or constraints.directions)[:, rows]
-        normal = normals(list(along))
-        normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
-        frame = np.concatenate([normal[None], along]).reshape(-1, dim)[components]
+        frame = constraints.compliance_axes[:, rows].reshape(-1, dim)[components]
     if F.U is not None:
         assert constraints.compliance is not None
         d, P, inverse_mass = constraints.compliance.split(rows)

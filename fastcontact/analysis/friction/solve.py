@@ -48,7 +48,7 @@ def solve(
 
     Each constraint in F costs columns of the inverse stiffness matrix. The problem therefore begins with the constraints that
     were closed, and adds others if they penetrate. Constraints that are never added are open and free of forces, so that the
-    result is that of the complete problem. If a compliance couples constraints, all of them are included from the start.
+    result is that of the complete problem.
 
     Parameters
     ----------
@@ -70,15 +70,14 @@ def solve(
         Data at the beginning of the step, if it is solved in increments along the load path.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
-    coupled = constraints.coupled
-    if isinstance(loaded, LoadedNonsymmetric) and not coupled:
+    if isinstance(loaded, LoadedNonsymmetric) and not constraints.coupled:
         solution = _eliminated(loaded, constraints, closed, accuracy, u, forces, path)
         if solution is not None:
             return solution
         log.info("friction: the iteration on eliminated constraints did not converge, their compliance is formed")
     usable, iterations = constraints.usable, 0
     initial = closed | constraints.equality | (False if path is None else ~path.waiting)
-    included = usable if coupled else usable & initial
+    included = usable & initial
     while True:
         solution = _with_included(np.flatnonzero(included), loaded, constraints, closed, u, forces, path)
         solution.gap[~usable], solution.slip[~usable] = np.inf, 0.0
@@ -160,7 +159,10 @@ def _with_included(
     u = loaded.involved_solution(R.T @ y.ravel()[components], u)
     all_forces, (active, sticking) = np.zeros((1 + k, m)), np.zeros((2, m), bool)
     gaps = constraints.gaps_at_rest() + (all_rows @ u).reshape(1 + k, m)
-    all_forces[:, rows], gaps[:, rows] = y, gaps_of_included
+    all_forces[:, rows] = y
+    if constraints.coupled:
+        gaps += constraints.coupled_gaps(all_forces)
+    gaps[:, rows] = gaps_of_included
     active[rows], sticking[rows] = result.closed, result.sticking
     return Solution(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
