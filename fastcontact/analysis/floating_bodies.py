@@ -29,6 +29,7 @@ from numpy.linalg import LinAlgError, norm
 from scipy.linalg import qr
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact._tools.records import record
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
 from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
@@ -131,7 +132,7 @@ class PositionResponse:
         return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SoftSprings(Loaded):
     """A prepared matrix with a right-hand side, in which the springs are softer.
 

@@ -15,12 +15,12 @@ of second order.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged, nearest_nodes
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
@@ -41,7 +41,7 @@ UPDATES_BEFORE_ROUNDING = 25
 SAFETY = 3.0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SettledContact:
     """The contact solution of a load step, with converged geometry.
 
@@ -192,7 +192,7 @@ def _settle(
     return SettledContact(constraints, solution, iterate, last_change, nodes=nodes)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Update:
     """Change of the displacements in one geometry update, in the components of `Problem.dofs`.
 

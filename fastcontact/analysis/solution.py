@@ -27,6 +27,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded
@@ -88,7 +89,7 @@ def response(loaded: Loaded, R: csr_array, place: Indices, forces_of: Callable[[
     return respond
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Forces:
     """Solution of Newton's method, or the best iterate if it has not converged.
 
@@ -125,7 +126,7 @@ IncrementSolver = Callable[[Array, Mask, Mask, Array | None], Forces]
 GROWTH = 1 / 32
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Path:
     """Data of the constraints at the beginning of a load step, for friction along the load path in increments.
 
@@ -164,7 +165,7 @@ class Path:
         return forces, np.vstack([self.gap[rows], (closing * tangents).sum(axis=2)])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SlipSoFar:
     """Data of the constraints at the beginning of the last increment of a load step.
 
@@ -192,7 +193,7 @@ class SlipSoFar:
     begin: float
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Solution:
     """Solution of the contact problem of one pairing, with or without friction.
 

@@ -8,11 +8,11 @@ deformations, they are computed only once, before the contact.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
 from fastcontact.analysis.equilibrium import StepEquilibrium
@@ -33,7 +33,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeatSolution(Temperatures):
     """Temperatures with the heat flux through contacts.
 

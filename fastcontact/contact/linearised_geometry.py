@@ -20,7 +20,6 @@ forces and slips. The equations of slips are in `Slips`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
@@ -28,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
@@ -329,7 +329,7 @@ class _ObstaclePoints:
 Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ClosingMotion:
     """Part q m of the relative motion that closes the gap, with ``q = a . o / a . m``; see `Slips`.
 
@@ -392,7 +392,7 @@ class ClosingMotion:
         return d_q[:, None] * mean + self.length[:, None] * d_mean
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Substitution:
     """Additional slip along an axis in which supports hold nodes.
 
@@ -436,7 +436,7 @@ class Substitution:
         return self.closing(closing) + self.along_axis(self.functions @ motion)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Slips:
     r"""Slips in a step at n points or weighted gaps along k tangents t, and the tangential forces.
 
@@ -532,7 +532,7 @@ def _weighted(weights: csr_array | None, values: Array) -> Array:
     return values if weights is None else np.asarray(weights @ values)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LinearisedPoints:
     """Contact forces, gaps and slips of one pair, linearised about a pairing and its solution.
 
@@ -660,7 +660,7 @@ class LinearisedPoints:
         return total
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FiniteDifferences:
     """Contact forces, gaps and slips of one pair, linearised by one-sided finite differences.
 

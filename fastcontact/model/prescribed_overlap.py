@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
@@ -31,7 +32,7 @@ ADMISSIBLE_DEPTH = 1e-3
 MAX_INSTANTS = 20
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Supports:
     """Prescribed displacements: components (n_points, dim), values at multiplier 1 by ramp [length], and the global ramp."""
 

@@ -9,17 +9,16 @@ field. On surfaces in 3D, z has fewer components than x. Other operators have th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Delassus:
     """The symmetric matrix ``F = diag(d) + U S U.T`` (n, n), or ``diag(d) + S`` without U; see the docstring of the module.
 

@@ -17,12 +17,12 @@ With large coefficients of friction the solution may not be unique. The methods 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
+from fastcontact._tools.records import record
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction.cone_newton import Law, newton
 from fastcontact.analysis.friction.delassus import Delassus
@@ -185,7 +185,7 @@ def numbers_at(at: Indices, shape: tuple[int, ...]) -> Indices:
     return result
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Equations:
     """The equations of closed constraints for their q forces x: ``A z = -right(free)`` with ``x = -H free + back z``.
 
