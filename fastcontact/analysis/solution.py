@@ -22,19 +22,18 @@ The last increment depends on the earlier ones only through their slips, which s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact._tools.records import record
+from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
 
-@dataclass(frozen=True)
+@record
 class Accuracy:
     """Tolerances and limits of one solution of the contact inequalities.
 
