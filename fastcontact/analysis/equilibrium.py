@@ -13,13 +13,13 @@ The pressure of a fluid between the contact surfaces is a term.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact._tools.records import field, record
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
@@ -168,7 +168,7 @@ class Terms:
         return K
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Balance:
     """Forces at the end of a load step.
 
@@ -300,7 +300,7 @@ def _round_off(problem: Problem, product: Array, forces: tuple[Array, ...], scal
     return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(product), force_round_off), noise
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StepEquilibrium:
     """The equilibrium at the end of a load step.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array, Mask, largest
 
@@ -19,7 +19,7 @@ MAX_RATIO = 2.0
 MAX_DEGREE = 4
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Extrapolation:
     """The last converged load steps, at most MAX_DEGREE + 1, and their extrapolation to the current load.
 

@@ -17,10 +17,8 @@ solution reduces the forces of the springs by about the ratio of their stiffness
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -29,6 +27,7 @@ from numpy.linalg import LinAlgError, norm
 from scipy.linalg import qr
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
 from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
@@ -53,7 +52,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 SOFT = 1e-3
 
 
-@dataclass(frozen=True)
+@record
 class RigidPosition:
     """Result of the iteration for the position of floating bodies.
 
@@ -78,7 +77,7 @@ class RigidPosition:
     slack: bool
 
 
-@dataclass(frozen=True)
+@record
 class PositionResponse:
     """Linear response of a contact solution with fixed contact state to the positions at which the springs are anchored.
 
@@ -131,7 +130,7 @@ class PositionResponse:
         return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SoftSprings(Loaded):
     """A prepared matrix with a right-hand side, in which the springs are softer.
 
@@ -393,5 +392,5 @@ class FloatingBodies:
             # a peeling layer, approach equilibrium slowly.
             anchor = mixing.mixed(anchor, anchor + elongation) if step is None else anchor + step[0]
             last_stretch, newton_stretch = stretch, 0.0 if step is None else stretch
-        solution = dataclasses.replace(solution, iterations=iterations)
+        solution = replace(solution, iterations=iterations)
         return RigidPosition(solution, anchor, self.stiffness * elongation, positions, slack)

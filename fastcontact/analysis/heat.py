@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.sparse import bsr_array, coo_array, csr_array
 
+from fastcontact._tools.records import field, record, replace
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.errors import ConvergenceError
@@ -24,7 +24,7 @@ from fastcontact.round_off import SUM_ROUND_OFF
 ByRamp = Mapping[Table | None, Array]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Temperatures:
     """Steady temperatures and heat flows.
 
@@ -46,7 +46,7 @@ class Temperatures:
     fluxes: dict[str, Array] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ThermalLoads:
     """Heat loads and films of a model.
 
@@ -75,7 +75,7 @@ def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoa
     return ThermalLoads(csr_array(matrix), powers, sums_by_ramp((ramp, power) for ramp, _, power in exchanges))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Heat:
     """Heat conduction of a model, prepared for analysis; temperatures are rises above the reference temperature.
 

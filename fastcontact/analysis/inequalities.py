@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.analysis import active_set
 from fastcontact.analysis.convergence_messages import friction_exceeded, not_restrained
 from fastcontact.analysis.extrapolation import Extrapolation
@@ -116,7 +117,7 @@ def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapol
     return np.concatenate(sets)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StepContext:
     """Data that all pairings of the contact surfaces in a load step share.
 

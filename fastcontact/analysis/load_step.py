@@ -21,7 +21,6 @@ from fastcontact.analysis import thermal_coupling
 from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
-from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad

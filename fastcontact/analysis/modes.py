@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.records import record
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
 from fastcontact.analysis.modal.cyclic import Sectors, Wave, complex_eigenpairs, open_sector
@@ -138,7 +138,7 @@ def _diameters(model: Model, sectors: Sectors, requested: int | str | Sequence[i
     return sectors.diameters(requested)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Vibration:
     """Matrices of small motions: stiffness K [force / length], mass M [mass], conditions of contact, and the shift of K."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit import parallel
+from fastcontact._tools.records import field, record, replace
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.floating_bodies import FloatingBodies
@@ -54,7 +54,7 @@ ByRamp = Mapping[PartHistory, Array]
 NEGLIGIBLE_SHEAR = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StepLoad:
     """The loads at the end of a load step.
 
@@ -94,7 +94,7 @@ class StepLoad:
     rise: Array | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Problem:
     """A model prepared for analysis.
 

@@ -674,8 +674,10 @@ def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
             rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
             # The neglected strain is 0.5 W.T @ W = -0.5 W @ W, since the rotation W is antisymmetric.
             neglected_work = -0.5 * np.einsum("cqij,cqij->cq", stress_tensor, rotation @ rotation)
-            size, rotated = (np.linalg.norm(tensor, axis=(2, 3)) for tensor in (slope - rotation, rotation))
-            neglected_work[size < SINGLE_PRECISION * rotated] = 0.0  # stresses of a rigid-body motion are round-off
+            strain, rotated = (np.einsum("cqij,cqij->cq", part, part) for part in (slope - rotation, rotation))
+            neglected_work[strain < SINGLE_PRECISION**2 * rotated] = (
+                0.0  # stresses of a rigid-body motion are round-off
+            )
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
             np.add.at(work_by_body, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
     return neglected, work_by_body

@@ -14,13 +14,13 @@ Tangents at the second end are rotated to the first one before they are compared
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
@@ -29,7 +29,7 @@ from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SharedNodes:
     """Linearly dependent constraints, and the fraction of the force that each carries.
 

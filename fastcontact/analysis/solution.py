@@ -22,18 +22,18 @@ The last increment depends on the earlier ones only through their slips, which s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
 
-@dataclass(frozen=True)
+@record
 class Accuracy:
     """Tolerances and limits of one solution of the contact inequalities.
 
@@ -88,7 +88,7 @@ def response(loaded: Loaded, R: csr_array, positions: Indices, forces_of: Callab
     return respond
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FrictionSolution:
     """Forces of a problem with friction by Newton's method, or those of its best iterate if it has not converged.
 
@@ -130,7 +130,7 @@ def _components(vectors: Array, directions: tuple[Array, ...]) -> Array:
     return np.asarray((vectors * np.stack(directions)).sum(axis=2))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LoadPath:
     """Data of the constraints at the beginning of a load step, for friction along the load path in increments.
 
@@ -168,7 +168,7 @@ class LoadPath:
         return forces[:, rows], np.vstack([self.gap, _components(self.closing, directions)])[:, rows]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LastIncrement:
     """Data of the constraints at the beginning of the last increment of a load step.
 
@@ -211,7 +211,7 @@ class LastIncrement:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Solution:
     """Solution of the contact problem of one pairing, with or without friction.
 

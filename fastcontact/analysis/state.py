@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.records import field, record
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
@@ -28,7 +28,7 @@ REQUIRED_ARRAYS, ARRAYS = ("active", "pressure"), ("locked", "history")
 CLASSES: dict[str, type[Bond | ContactForces]] = {"bonds": Bond, "forces": ContactForces}
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class State:
     """The state at the end of a load step, or before the first one.
 

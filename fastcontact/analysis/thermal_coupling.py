@@ -8,11 +8,11 @@ deformations, they are computed only once, before the contact.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
 from fastcontact.analysis.equilibrium import StepEquilibrium

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.neighbours import nearest
+from fastcontact._tools.records import record
 from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.configuration import Configuration
@@ -29,7 +30,7 @@ from fastcontact.results.step import ContactResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ContactForces:
     """Contact forces of a pair at the end of a load step, from which the work of the next step is integrated.
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.neighbours import nearest
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array
 
 # Default ratio of the opening at the largest traction to that at break.
@@ -109,7 +110,7 @@ def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **
     return CohesiveLaw(strength, energy, stiffness, **options, reversible=reversible)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Bond:
     """State of a cohesive layer at the end of a load step.
 

@@ -8,11 +8,10 @@ definite, and the iteration over pairings converges to every state that is stabl
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array, vstack
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.cohesion import INITIATION_RATIO, Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
@@ -28,7 +27,7 @@ SOFTENING_SLOPE = INITIATION_RATIO
 COMPRESSION_FACTOR = 100.0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CohesiveLayer:
     """Cohesive layer with m equations for its openings and m for sliding along each of k tangents; see `constraints.Tied`.
 
@@ -89,7 +88,7 @@ class CohesiveLayer:
         return Bond(before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ squares))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Softening:
     """Derivatives of the gaps of the linearised law with respect to the separations at which it is linearised.
 

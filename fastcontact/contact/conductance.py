@@ -9,12 +9,12 @@ multiplier sum to one, so that a uniform flux is transmitted exactly between non
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
@@ -107,7 +107,7 @@ class Conductance:
         return h
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeatTransfer:
     """Discrete heat transfer between the two sides of a contact pair.
 

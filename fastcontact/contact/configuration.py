@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 from fastcontact.contact.obstacles.rigid_side import Pose
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Configuration:
     """The configuration in which the two sides of a contact pair are paired.
 

@@ -7,13 +7,13 @@ secondary nodes, and k the number of tangents, which is one in 2D, two in 3D, an
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
+from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import normals
@@ -183,7 +183,7 @@ class Tied(Protocol):
         """
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Constraints:
     """Contact constraints ``gap0 + B u + C multiplier >= 0`` with multipliers >= 0, or equations.
 
@@ -395,7 +395,7 @@ class Constraints:
         return self.nodal_field.pressure(self.normal_forces(multiplier))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StackedConstraints(Constraints):
     """The constraints of several contact pairs, whose rows are stacked.
 

@@ -16,10 +16,9 @@ half the chord, not half the arc.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import FACING
@@ -28,7 +27,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class UnrolledLine:
     """Polygonal line through the nodes of a surface in 2D.
 
@@ -94,7 +93,7 @@ def _nodes_of_closed_line(surface: Surface) -> list[int] | None:
     return [node for facet in order for node in chains[facet]] if facet == 0 and len(order) == len(chains) else None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ContactMiddle:
     """Middle of a contact zone in a load step.
 

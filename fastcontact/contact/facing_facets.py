@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.projection import CORNER, closest_of_types
 from fastcontact.contact.surface import by_block
@@ -22,7 +22,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 INSET = 0.02
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class OuterFacets:
     """The n outer facets of bodies, in blocks of one element type and numbered consecutively through all blocks.
 
@@ -130,7 +130,7 @@ class OuterFacets:
         return {name: block[rows] for (name, block), (_, rows) in blocks_and_rows if len(rows)}
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FacingPoints:
     """Points of facets that face another body.
 

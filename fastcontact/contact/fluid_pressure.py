@@ -9,12 +9,11 @@ deformed surface at which the bodies are linearised, and their variation enters 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from scipy.sparse import csr_array, diags_array, eye_array, kron
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -30,7 +29,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 EDGE_PENETRATION = 0.01
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WettedRegion:
     """Region of a contact that the fluid has reached.
 
@@ -62,7 +61,7 @@ class WettedRegion:
         return csr_array(0.5 * (K + K.T))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class AreaVectors:
     """Outward area vectors of the deformed secondary side at its nodes, per reference area (Nanson's formula).
 

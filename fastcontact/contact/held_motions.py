@@ -6,7 +6,6 @@ u of the node is prescribed. Supports at the end of a surface may represent a pl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER, nodal_normals
 from fastcontact.contact.surface import Surface
@@ -30,7 +30,7 @@ SMOOTH_INCLINATION = float(np.sin(np.radians(21.0)))
 PLANE_TOLERANCE, PARALLEL = 2e-5, 1.0 - SINGLE_PRECISION
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeldMotions:
     """Prescribed components of the displacements of nodes.
 

@@ -20,14 +20,14 @@ forces and slips. The equations of slips are in `Slips`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
@@ -124,6 +124,36 @@ def transverse(normal: Array, vector: Array) -> Array:
     return np.asarray(vector - np.einsum("nd,nd->n", normal, vector)[:, None] * normal)
 
 
+class NodalWeights(NamedTuple):
+    """Sparse matrix whose n rows contain the weights of k nodes each, for products with a few vectors.
+
+    The products are those of a `csr_array`, whose construction would take longer than the products.
+
+    Attributes
+    ----------
+    values : ndarray (n, k)
+        The weights [-].
+    nodes : ndarray of int (n, k)
+        The nodes, in ascending order in each row.
+    """
+
+    values: Array
+    nodes: NDArray[np.integer]
+
+    def product(self, nodal: Array) -> Array:
+        """Return the weighted sums (n, dim) of a nodal field (n_points, dim)."""
+        terms = (self.values[:, k, None] * nodal[self.nodes[:, k]] for k in range(self.nodes.shape[1]))
+        return sum(terms, np.zeros((len(self.nodes), nodal.shape[1])))
+
+    def transposed_product(self, forces: Array, n_points: int) -> Array:
+        """Return the nodal forces (n_points, dim) of forces (n, dim) at the points."""
+        dim = forces.shape[1]
+        columns = self.nodes[:, :, None] * dim + np.arange(dim)
+        weighted = self.values[:, :, None] * forces[:, None]
+        total = np.bincount(columns.ravel(), weighted.ravel(), n_points * dim)
+        return np.asarray(total, float).reshape(n_points, dim)
+
+
 class Variation(NamedTuple):
     """Variation of the projections of n points.
 
@@ -131,8 +161,8 @@ class Variation(NamedTuple):
     ----------
     xi : ndarray (n, dim - 1)
         Variation of the reference coordinates of the primary points that the points face [-].
-    motion : csr_array (n, n_points)
-        Variation of the matrix `motion` of the points [-].
+    motion : NodalWeights
+        Variation of the matrix `motion` (n, n_points) of the points [-].
     foot : ndarray (n, dim)
         Variation of the positions of these primary points, on the smooth surface if there is one, due to that of xi, with
         fixed facets [length].
@@ -141,7 +171,7 @@ class Variation(NamedTuple):
     """
 
     xi: Array
-    motion: csr_array
+    motion: NodalWeights
     foot: Array
     normal: Array
 
@@ -191,7 +221,9 @@ class _SurfacePoints:
         feet, n_points, facet = pairing.projections(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
         self.motion = shapes_at(shape, nodes, n_points)
-        self._feet = feet
+        self._feet, ascending = feet, np.argsort(feet.nodes, axis=1)
+        self._facing_nodes = np.take_along_axis(feet.nodes, ascending, axis=1)
+        self._weight_gradient = -np.take_along_axis(feet.gradient, ascending[:, :, None], axis=1)
         self.axes = self._slopes(coordinates)
         self.offset = self.motion @ coordinates
         self.normal, self.averaged = pairing.normal[rows], None
@@ -255,7 +287,7 @@ class _SurfacePoints:
         d_direction = d_facet_normal if self._closest else at_fixed_xi
         xi = np.einsum("nid,nd->ni", self._inverse, relative_motion - self._gap * d_direction)
         foot = np.einsum("nid,ni->nd", self._foot_gradient, xi)
-        motion = shapes_at(-np.einsum("nki,ni->nk", self._feet.gradient, xi), self._feet.nodes, len(du))
+        motion = NodalWeights(np.einsum("nki,ni->nk", self._weight_gradient, xi), self._facing_nodes)
         return Variation(xi, motion, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi))
 
     def stiffness(self, force: Array) -> csr_array:
@@ -316,7 +348,8 @@ class _ObstaclePoints:
         motion = self.motion @ du
         normal = np.einsum("nde,ne->nd", self._gradient, motion)
         foot = transverse(self.normal, motion) - self._gap * normal
-        return Variation(np.zeros((len(normal), 0)), csr_array(self.motion.shape), foot, normal)
+        no_nodes = NodalWeights(np.zeros((len(normal), 0)), np.zeros((len(normal), 0), int))
+        return Variation(np.zeros((len(normal), 0)), no_nodes, foot, normal)
 
     def stiffness(self, force: Array) -> csr_array:
         """See `_SurfacePoints.stiffness`."""
@@ -329,7 +362,7 @@ class _ObstaclePoints:
 Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ClosingMotion:
     """Part q m of the relative motion that closes the gap, with ``q = a . o / a . m``; see `Slips`.
 
@@ -392,7 +425,7 @@ class ClosingMotion:
         return d_q[:, None] * mean + self.length[:, None] * d_mean
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Substitution:
     """Additional slip along an axis in which supports hold nodes.
 
@@ -436,7 +469,7 @@ class Substitution:
         return self.closing(closing) + self.along_axis(self.functions @ motion)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Slips:
     r"""Slips in a step at n points or weighted gaps along k tangents t, and the tangential forces.
 
@@ -510,11 +543,11 @@ class Slips:
         normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
             Normals of the constraints, their variation, and the variation of the primary normals of `closing` [-].
         """
-        motion, (normal, d_normal, d_primary) = d_points.motion @ self.motion, normals
+        motion, (normal, d_normal, d_primary) = d_points.motion.product(self.motion), normals
         d_slip, d_closing = _weighted(weights, motion), np.zeros_like(normal)
         if self.closing is not None:
             if self.closing.along_mean:
-                d_opening = _weighted(weights, d_points.motion @ self.start)
+                d_opening = _weighted(weights, d_points.motion.product(self.start))
             else:  # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
                 d_opening = -d_slip - _weighted(weights, d_points.foot)
             d_closing = self.closing.variation(du, (normal, d_normal), d_primary, d_opening)
@@ -532,7 +565,7 @@ def _weighted(weights: csr_array | None, values: Array) -> Array:
     return values if weights is None else np.asarray(weights @ values)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LinearisedPoints:
     """Contact forces, gaps and slips of one pair, linearised about a pairing and its solution.
 
@@ -598,8 +631,12 @@ class LinearisedPoints:
             (rows, count), d_paired_gaps = self.rows_in_pair, d_gaps
             d_gaps = np.zeros((len(d_gaps), count))
             d_gaps[:, rows] = d_paired_gaps
-        nodal_forces = self.points.motion.T @ self._at_points(d_force, d_tangential) + d_points.motion.T @ self._force
-        return nodal_forces, d_gaps
+        nodal_forces = self._motion_transposed @ self._at_points(d_force, d_tangential)
+        return nodal_forces + d_points.motion.transposed_product(self._force, len(nodal_forces)), d_gaps
+
+    @cached_property
+    def _motion_transposed(self) -> csc_array:
+        return self.points.motion.T
 
     def _at_points(self, normal: Array, tangential: Array) -> Array:
         """Return the forces (n, dim) at the points for normal and tangential forces (m, dim) of the constraints [force]."""
@@ -660,7 +697,7 @@ class LinearisedPoints:
         return total
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FiniteDifferences:
     """Contact forces, gaps and slips of one pair, linearised by one-sided finite differences.
 

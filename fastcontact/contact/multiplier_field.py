@@ -5,12 +5,11 @@ For the formulas and symbols see `formulations._pressure_field`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import SuperLU
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
 from fastcontact.linear.delassus import MAX_ROWS
@@ -18,7 +17,7 @@ from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.sparse_rows import scaled
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Projection:
     """Projection of point forces onto a multiplier field, and compliance C of the remaining forces; see `Compliance`.
 

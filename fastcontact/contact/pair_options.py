@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array, eye_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.cohesion import CohesiveLaw
 from fastcontact.contact.conductance import Conductance
@@ -23,7 +23,7 @@ ALWAYS_CLOSED = ("tied", "bilateral")
 Field = Callable[[Array], Array]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PairOptions:
     """The options of a contact pair that do not depend on its formulation.
 

@@ -6,12 +6,12 @@ Mortar contact in 3D pairs facets with facets instead, see `formulations._cut_fa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
@@ -47,7 +47,7 @@ Normals: TypeAlias = str | Sequence[float]
 KINDS = ("facet", "averaged", "secondary")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Candidates:
     """Points of the secondary side at which the gap is measured, as weighted combinations of nodes.
 
@@ -109,7 +109,7 @@ class Candidates:
         return largest > np.where(inside, -np.inf, self.shape).max(axis=1) + LENGTH_ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Pairing:
     """Projection of each candidate onto the primary side.
 

@@ -9,13 +9,13 @@ onto facets in 3D, and `along_line_normals` onto lines in 2D.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from fastcontact._jit.parallel import parallel_map, portions
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
@@ -37,7 +37,7 @@ POINTS_PER_LEAF = 16
 SMALL_OVERHANG = 0.05
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FacetPoints:
     """Points of a surface, given by their facets and reference coordinates.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cached_by_mesh, ordered_line, outer_facets, outer_rows
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FacetBlock:
     """Facets of one element type.
 
@@ -49,7 +49,7 @@ class FacetBlock:
         return np.asarray(np.linalg.norm(x[:, :, None] - x[:, None], axis=3).max(axis=(1, 2)))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Surface:
     """Facets of one side of a contact pair.
 

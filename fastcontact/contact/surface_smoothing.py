@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER, closest_of_types
 from fastcontact.contact.surface import FacetBlock, Surface
@@ -38,7 +38,7 @@ DEGREE_FACTOR = 0.1
 PASSES = 3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SmoothSide:
     """Heights and curvatures of the smooth surface above the facets of one side.
 
@@ -69,7 +69,7 @@ class SmoothSide:
         return np.stack([side.height(facet, xi) for side in derivatives[: xi.shape[1]]], axis=1)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Smoothing:
     """The smooth surfaces of both sides of a contact pair."""
 
@@ -196,7 +196,7 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
     return adjacency, nodes, valid
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Fit:
     """Smooth surfaces above the planes of n facets, the sum of a surface of constant `curvature` (n, d, d) and a polynomial.
 

@@ -19,11 +19,10 @@ derivative along t on the primary facet. It vanishes in any small rotation of bo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array, vstack
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.multiplier_field import Projection
@@ -35,7 +34,7 @@ from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class TiedPair:
     """The equations of a tied pair.
 

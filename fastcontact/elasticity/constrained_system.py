@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate
 from fastcontact.errors import ModelError
@@ -26,7 +26,7 @@ from fastcontact.round_off import ROUND_OFF
 CONSISTENCY_TOLERANCE = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Stiffness:
     """A stiffness matrix in the form of a sum of matrices, `terms` (n, n) [force / length].
 

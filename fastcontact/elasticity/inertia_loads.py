@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.loads import DensityField, Table, VolumeLoad, add_density, measured_points, solid_rows
 from fastcontact.elasticity.materials import Material
@@ -15,7 +16,7 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Densities:
     """The densities of the materials of all solid cells.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Table, check_number, listed
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames, rotations
@@ -20,7 +20,7 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 ALWAYS: Table = ((-LARGEST, 1.0), (LARGEST, 1.0))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class InitialState:
     """An initial stress or strain of groups of solid cells, or of all solid cells.
 
@@ -123,7 +123,7 @@ def initial_state(
 ScaledStates = Sequence[tuple[float, InitialState]]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StressOffset:
     """Stress in addition to that caused by displacements, due to temperature, initial strains and initial stresses.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray, Array, Mask, Numbers
 from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.initial_states import ScaledStates, StressOffset
@@ -18,7 +18,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class EvaluationPoints:
     """Points of one element type at which a varying material is evaluated.
 
@@ -40,7 +40,7 @@ class EvaluationPoints:
     constants: Any
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MaterialField:
     """The materials of all solid cells.
 

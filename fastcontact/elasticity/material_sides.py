@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Numbers
 from fastcontact.mesh.mesh import Mesh
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MaterialSides:
     """Slots for nodal values: one for each node, and one for each additional material of a node at an interface.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 
 Table = tuple[tuple[float, float], ...]
@@ -17,7 +17,7 @@ CANCELLATION = 1e-10
 Row = dict[int, float]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MultiPointConstraint:
     """Equations ``rows @ u = value`` between displacement components.
 
@@ -39,7 +39,7 @@ class MultiPointConstraint:
     ramp: Table | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class TemporaryConstraint(MultiPointConstraint):
     """A constraint that acts in the load steps between two instants, and at whose beginning ``rows @ u`` is continuous.
 
@@ -81,7 +81,7 @@ class TemporaryConstraint(MultiPointConstraint):
         ]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Elimination:
     """Elimination of constraints: ``u = T w + S r`` satisfies ``R u = r`` for every w that satisfies the conditions.
 

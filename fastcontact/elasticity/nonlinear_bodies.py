@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import dilatation
 from fastcontact.elasticity.constitutive_kernels import LINEAR, LOGARITHMIC, PLASTIC, SAINT_VENANT
@@ -32,7 +32,7 @@ N_HISTORY, PLASTIC_STRAIN, OUT_OF_PLANE = 9, 6, 8
 COMPLETE = 2
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DeformedBodies:
     """Response of the bodies to a displacement.
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, stacked_rows, sum_of_blocks
@@ -24,7 +24,7 @@ WARNING_RATIO, ERROR_RATIO = 1e5, 1e12
 DIGITS = 16  # number of decimal digits in double precision
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Springs:
     """Springs that are defined together under one name.
 

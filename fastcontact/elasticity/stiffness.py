@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit import parallel
+from fastcontact._tools.records import field, record
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import dilatation, element_2d_kernels, element_3d_kernels, incompatible_modes
 from fastcontact.elasticity import stiffness_kernels as pattern_kernels
@@ -40,7 +40,7 @@ class Owners(NamedTuple):
     cells: list[tuple[int, int]]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Sparsity:
     """Sparsity of a stiffness matrix: the node pairs with a common cell.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array
 from fastcontact.elasticity import loads
 from fastcontact.elasticity.loads import Table, Value, check_number, check_value, evaluated
@@ -14,7 +14,7 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Temperature:
     """A temperature at the nodes of groups of solid cells, or of all solid cells.
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.loads import check_number, evaluated
 from fastcontact.errors import ModelError
@@ -81,7 +82,7 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Cells:
     """A set of solid cells of a mesh; `rows` contains their numbers (m,) of int by element type."""
 

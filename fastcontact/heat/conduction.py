@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
 from fastcontact.elasticity.mass import assembled, cell_portions
@@ -19,7 +19,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Conduction:
     """Solid cells that conduct heat by Fourier's law, in the reference configuration or in a deformed configuration.
 

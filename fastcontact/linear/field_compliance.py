@@ -17,16 +17,16 @@ this case, all values of the field have a compliance.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import block_diag, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FieldCompliance:
     """Compliance of m equations at points of multiplier fields. For the symbols, see the docstring of the module.
 
@@ -120,7 +120,7 @@ class FieldCompliance:
         return csr_array(scaling @ E @ scaling)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FieldEquations:
     """Equations ``rows u + E p = rhs`` for those values p (l,) of a field that occur in the equations at points.
 

@@ -15,6 +15,7 @@ from typing import Any, Protocol, Self, TypeAlias, runtime_checkable
 
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.springs import Springs
@@ -122,7 +123,7 @@ class Loaded(Protocol):
         return self
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FrictionTerms:
     """Terms of sliding friction in the equations of equilibrium, see `LoadedNonsymmetric.solve_nonsymmetric`.
 

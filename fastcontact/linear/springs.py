@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import DTypeLike
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear.sparse_rows import entry_rows, scaled
 
@@ -18,7 +18,7 @@ from fastcontact.linear.sparse_rows import entry_rows, scaled
 MAX_DIFFERENCE = 0.3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Springs:
     """Springs with the forces ``-force_rows.T @ (stiffness * (rows @ u))`` on n unknowns u.
 

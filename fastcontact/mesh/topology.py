@@ -8,7 +8,6 @@ with two common nodes in 2D, or with three common nodes that are not collinear i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import wraps
 from types import MappingProxyType
 from typing import Concatenate, ParamSpec, TypeVar
@@ -19,6 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import FastcontactError, MeshError
 from fastcontact.mesh import elements, quadrature
@@ -212,7 +212,7 @@ def outer_rows(
     return rows
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class OrderedLine:
     """The nodes of a line of facets in their order along the line.
 
@@ -287,7 +287,7 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
     return OrderedLine(points, np.concatenate([[0.0], np.cumsum(lengths)]))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class RigidParts:
     """The rigid parts of bodies, and the hinges between them.
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, eye_array, hstack
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -25,7 +25,7 @@ from fastcontact.model.ramp import PartHistory, Table
 from fastcontact.model.rigid_motions import FreeMotions
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ForceDrivenObstacles:
     """The force-driven obstacles of a model.
 

@@ -6,13 +6,13 @@ nodes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._tools.neighbours import pairs_within
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 NEAR, ON_ARC = 0.02, 0.1
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class OuterFacets:
     """Outer facets of all bodies, treated as flat.
 

@@ -6,11 +6,11 @@ Contact forces cannot change prescribed displacements.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
@@ -31,7 +31,7 @@ ADMISSIBLE_DEPTH = 1e-3
 MAX_INSTANTS = 20
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Supports:
     """Prescribed displacements: components (n_points, dim), values at multiplier 1 by ramp [length], and the global ramp."""
 
@@ -49,7 +49,7 @@ class Supports:
         return combined(self.by_ramp, self.ramp, instant, self.fixed.shape)
 
 
-@dataclass(frozen=True)
+@record
 class Overlap:
     """Penetration of a contact pair at an instant.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.argument_types import finite_vector
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
@@ -21,7 +21,7 @@ from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 SMALLEST_COSINE = 0.7
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Pretension:
     """A pretension section, whose sides move relative to each other only along its normal, by the same amount at all nodes.
 
@@ -93,7 +93,7 @@ class Pretension:
         return constraints
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PretensionForce(Load):
     """The force that pulls the sides of a pretension section together."""
 

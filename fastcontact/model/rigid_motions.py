@@ -7,13 +7,13 @@ loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and S
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
@@ -51,7 +51,7 @@ class Label(NamedTuple):
     arm: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FreeMotions:
     """Independent rigid-body motions that supports and constraints allow.
 

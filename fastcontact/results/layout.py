@@ -94,6 +94,8 @@ CONTACT_FIELDS = {
     "contact_damage": ("damage", ""),
     "contact_fluid_pressure": ("fluid pressure", "pressure"),
 }
+# Point data that are zero at most nodes.
+SPARSE_FIELDS = ("reaction", "heat_reaction", *CONTACT_FIELDS)
 # Point data that only some models have: heat conduction, wear, cohesive layers or adhesion, and fluid pressures.
 OPTIONAL_FIELDS = ("temperature", "heat_reaction", "contact_wear", "contact_damage", "contact_fluid_pressure")
 # Optional columns of contact tables, and optional vectors of contact pairs.

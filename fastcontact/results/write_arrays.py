@@ -142,14 +142,14 @@ def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
     """Create an empty field.
 
     A chunk contains a small field at several steps, because the chunk index would otherwise be larger than the fields. Only
-    chunks of a single step are compressed, because a compressed chunk moves in the file when data are added to it.
+    chunks of a single step are compressed, because a compressed chunk moves in the file when data are added to it, and only
+    those of `layout.SPARSE_FIELDS`. Other fields would shrink by a third, in half the time of writing a file.
     """
     tail, rows = () if width == 1 else (width,), max(length, 1)
     steps = MAX_SHARED // (8 * rows * width)
-    parent.create_dataset(
-        name, shape=(0, *tail), maxshape=(None, *tail), chunks=(max(steps, 1) * rows, *tail), dtype=np.float64,
-        **({} if steps > 1 else {"compression": "gzip", "compression_opts": 1}),
-    )  # fmt: skip
+    packed = {"compression": "gzip", "compression_opts": 1} if steps <= 1 and name in layout.SPARSE_FIELDS else {}
+    chunks = (max(steps, 1) * rows, *tail)
+    parent.create_dataset(name, shape=(0, *tail), maxshape=(None, *tail), chunks=chunks, dtype=np.float64, **packed)
 
 
 def growing_table(parent: Any, name: str, dtype: Any, width: int = 0, rows: int = ROWS) -> Any:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.summary import finite_or_none
 from fastcontact.studies.fit import Limit, step_orders
@@ -119,7 +120,7 @@ class Level(RunResult):
     number: int
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Series:
     """Results of one element type and formulation on all meshes.
 
@@ -287,7 +288,7 @@ class Point(RunResult):
         return self.values.get(quantity, math.nan) / denominator if denominator else math.nan
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class TheoryCurve:
     """Theory of a case as a function of the parameter over which a sweep is drawn.
 

@@ -26,12 +26,12 @@ its k tangential forces [length / force], in this order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array
 
+from fastcontact._tools.records import record
 from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
 from fastcontact.analysis.solution import FrictionSolution
 from fastcontact.arrays import Array, Indices, Mask
@@ -39,7 +39,7 @@ from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Law:
     """Unilateral contact with Coulomb friction of m constraints.
 

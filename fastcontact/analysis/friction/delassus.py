@@ -9,12 +9,11 @@ field. On surfaces in 3D, z has fewer components than x. Other operators have th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.sparse import csc_array, csr_array, diags_array, hstack
 
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.delassus import MAX_ROWS_WITH_FRICTION, check_rows
@@ -23,7 +22,7 @@ from fastcontact.linear.sparse_rows import scaled
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Delassus:
     """The symmetric matrix ``F = diag(d) + U S U.T`` (n, n), or ``diag(d) + S`` without U; see the docstring of the module.
 

@@ -17,12 +17,13 @@ With large coefficients of friction the solution may not be unique. The methods 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction.cone_newton import Law, newton
 from fastcontact.analysis.friction.delassus import Delassus
@@ -194,7 +195,7 @@ def numbers_at(at: Indices, shape: tuple[int, ...]) -> Indices:
 ForceResponse = Callable[[Array], Array]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Equations:
     """The equations of closed constraints for their q forces x: ``A z = -S T free`` with ``x = -H free + back z``.
 

@@ -10,11 +10,10 @@ diagonal compliance of these equations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._tools.records import field, record, replace
 from fastcontact.analysis.friction import cone_newton
 from fastcontact.analysis.solution import Accuracy, FrictionSolution
 from fastcontact.analysis.tolerances import RESIDUAL
@@ -245,7 +244,7 @@ def diagonal_compliance(constraints: Constraints) -> Array:
     return np.stack([constraints.softness, *[constraints.tangential_softness] * len(constraints.tangents)])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Sliding:
     """Linearised friction of q sliding constraints.
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import bmat, bsr_array, csr_array, eye_array, vstack
 
+from fastcontact._tools.records import record
 from fastcontact.analysis.modal.held_contact import Conditions
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -23,7 +23,7 @@ from fastcontact.model.periodicity import PeriodicInterface, turned_rows
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Sectors:
     """The sectors of a ring, or a single sector if the model has no cyclic symmetry.
 
@@ -82,7 +82,7 @@ def _sense(interface: PeriodicInterface, rotation: Array) -> int:
     return -1 if np.allclose(interface.turn, rotation.T, atol=LENGTH_ROUND_OFF) else 0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Wave:
     """Motions with a given number of nodal diameters."""
 

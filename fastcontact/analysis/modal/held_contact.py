@@ -7,11 +7,11 @@ Computational Contact Mechanics, 2006, section 5.3). Penalties are springs.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import block_diag, bsr_array, csr_array, diags_array, vstack
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.resultants import end_of
 from fastcontact.analysis.wear import at_points
 from fastcontact.arrays import Array, Indices
@@ -25,7 +25,7 @@ from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Conditions:
     """Relative displacements of a contact pair along its normals or tangents, which vanish or have a compliance.
 
@@ -50,7 +50,7 @@ class Conditions:
     compliance: csr_array | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeldContact:
     """Constraints and compliance of closed contact for small motions.
 

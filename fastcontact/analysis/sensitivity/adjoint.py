@@ -9,12 +9,12 @@ bodies. GMRES solves ``s + E.T J0^-T s = E.T J0^-T q`` for ``s = E.T y``.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from fastcontact._tools.records import record
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.arrays import Array, largest
 from fastcontact.errors import ConvergenceError
@@ -24,7 +24,7 @@ from fastcontact.linear.protocol import TOLERANCE
 SOLUTIONS = 200
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Gradient:
     """A quantity at the end of a load step, and its derivatives.
 
@@ -48,7 +48,7 @@ class Gradient:
     reaction: Array | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Change:
     """Partial derivatives of the residual with respect to a parameter, at fixed displacements and multipliers.
 

@@ -10,12 +10,12 @@ Appl. 13, 1974).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array, eye_array, hstack, kron, vstack
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.contact_result import closed_node_pressures
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
@@ -38,7 +38,7 @@ OPPOSITE_NODES = (
 INCREMENT = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MovingContact:
     """The contact of a load step with fixed multipliers, for any pairing of its surfaces.
 

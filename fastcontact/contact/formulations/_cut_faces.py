@@ -6,12 +6,11 @@ facets are clipped as polygons of their corners, with an error of second order i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._jit import parallel
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
@@ -107,7 +106,7 @@ def _heights(
     return smoothing.secondary.heights[secondary], smoothing.primary.heights[primary], factors
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Polygons:
     """Deformed facets of a block, as polygons of their corners in planes.
 

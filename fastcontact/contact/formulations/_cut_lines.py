@@ -7,10 +7,9 @@ not face the primary side, and their projections must agree with this cut.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
 from fastcontact.contact.pairing import FACING, Candidates, pair
@@ -26,7 +25,7 @@ LARGEST_CUT = 1.0 - 2.0 * SINGLE_PRECISION
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LinePoints:
     """Integration points of all segments of a block.
 

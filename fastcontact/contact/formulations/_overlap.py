@@ -6,18 +6,18 @@ rigid obstacle, Gauss quadrature over complete facets suffices, see `obstacle_ov
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.integration import areas_of_rule
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import FacetBlock, Surface
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Coupling:
     """Overlapping facets of a secondary and a primary block.
 
@@ -54,7 +54,7 @@ class OverlapPoints(NamedTuple):
     area: Array
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Overlap:
     """The overlap of two surfaces.
 

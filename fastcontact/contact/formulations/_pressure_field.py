@@ -33,6 +33,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Geometry, Linearised, NodalField
@@ -52,7 +53,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 LARGEST_PRESSURE_COMPONENT = 0.5
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PressureField(NodalField):
     """A pressure field with values at the secondary nodes; see `constraints.NodalField`.
 

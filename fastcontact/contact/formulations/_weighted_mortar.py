@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Linearised, NodalField
@@ -534,7 +535,7 @@ class WeightedMortar(Formulation):
         return contribution
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WeightedPressures(NodalField):
     """Pressures of weighted gaps at the nodes; see `constraints.NodalField`.
 

@@ -29,6 +29,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array, lil_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -49,7 +50,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 SMALLEST_EIGENVALUE = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CompleteFacets:
     """Mass matrices of the complete facets of a block, which have k nodes each.
 

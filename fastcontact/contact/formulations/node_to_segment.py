@@ -20,6 +20,7 @@ from scipy.sparse import csr_array, eye_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from fastcontact._tools.neighbours import nearest
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
@@ -105,7 +106,7 @@ class NodeToSegment(Formulation):
         return NodalForces(areas, to_nodes, independent, splu((to_nodes.T @ mass @ to_nodes).tocsc()))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class NodalForces(NodalField):
     """Map from nodal contact forces to nodal pressures; see `constraints.NodalField`.
 

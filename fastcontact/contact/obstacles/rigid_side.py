@@ -8,13 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import MASKED_ENTRIES, Array, Mask, Numbers, is_masked
 from fastcontact.contact.obstacles._obstacle import Obstacle
 from fastcontact.errors import ContactError
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Pose:
     """Position and rotation of a rigid obstacle.
 
@@ -30,7 +31,7 @@ class Pose:
     angle: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class RigidSide:
     """A rigid obstacle that may translate and rotate; its position is part of the configuration."""
 

@@ -13,7 +13,6 @@ its entries may be large.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -21,6 +20,7 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
@@ -51,7 +51,7 @@ class CoupledError(DependenceError):
         )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SparseInverse:
     """Inverse of P as a sparse matrix.
 

@@ -6,12 +6,12 @@ of B that belong to the pivots, and the remaining columns R, this is ``u[pivots]
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, Inverse, SparseInverse
@@ -20,7 +20,7 @@ from fastcontact.linear.sparse_rows import entry_rows
 NO_INVERSE = SparseInverse(csr_array((0, 0)))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Elimination:
     """Elimination of m unknowns by m equations among n unknowns.
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
@@ -134,7 +134,7 @@ class LoadedMultigrid(LoadedIteration):
             return _DividedEquations.of(B, c, C, C == 0.0, nodes, size, force_rows)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _DividedEquations:
     """Equations, divided into eliminated ones and springs.
 
@@ -190,7 +190,7 @@ class _DividedEquations:
         return multiplier
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _DividedFieldEquations(_DividedEquations):
     """Equations at m points in the form of equations for a pressure field, and of springs; see `field_compliance`.
 

@@ -8,20 +8,20 @@ diagonal stiffness S change the matrix by ``R.T S R``, which has this form with 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 from scipy.sparse import bsr_array, csc_array, csr_array
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 from fastcontact.linear.sparse_rows import entry_rows, scaled
 from fastcontact.linear.springs import Springs
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LocalChange:
     """Symmetric change of a block matrix that is restricted to the rows and columns of k nodes.
 
@@ -90,7 +90,7 @@ def rows_of_prolongator(P: BlockMatrix, nodes: Indices) -> tuple[Indices, bsr_ar
     return coarse_nodes, bsr_array((data, columns, indptr), shape=(len(nodes) * rows, len(coarse_nodes) * cols))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SymmetricChange:
     """The change ``D.T G + G.T D`` of a matrix (n, n).
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array
 
 Function = Callable[[Array], Array]
@@ -22,7 +22,7 @@ _FACETS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Element:
     """A reference element.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
+from fastcontact._tools.records import field, record
 from fastcontact.arrays import AnyArray, Indices
 from fastcontact.errors import MeshError, warn
 from fastcontact.mesh import elements
@@ -118,7 +118,7 @@ def _point_groups(content: Mapping[str, Any]) -> dict[str, AnyArray]:
     return groups
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Block:
     """Cells of one kind, an element type or ``"vertex"``: the nodes (n_cells, n_nodes), and the rows of each group."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
@@ -23,7 +23,7 @@ _LATTICE = {"line2": "line3", "tri3": "tri6", "quad4": "quad9"}
 _LARGEST_ANGLE = np.pi / 5
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Pattern:
     """The division of a cell of one element type, described by the points of its children.
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.recovery import principal_stress, tresca, von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, check_known
@@ -18,7 +18,7 @@ from fastcontact.results.tables import AXES, STRESS_COMPONENTS
 from fastcontact.results.units import value_text
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Field:
     """A scalar field at the points of a mesh, which is cut along material interfaces for stresses.
 
