@@ -1,9 +1,10 @@
 """Solve one load step: evaluate loads, iterate to equilibrium with contact, and compute results.
 
 First the loads and the prescribed displacements at the end of the step are evaluated. Newton's method (`newton`) then solves
-the equilibrium. Each of its iterations pairs the contact surfaces on the deformed configuration, solves the inequalities of
-contact, and repeats both until the displacements converge (`geometry_loop`). The remaining displacements, the force balance
-and the stresses follow from the contact forces. This module is the place to start reading the code.
+the equilibrium, repeatedly where surfaces wear (`wear_iteration`). Each of its iterations pairs the contact surfaces on the
+deformed configuration, solves the inequalities of contact, and repeats both until the displacements converge
+(`geometry_loop`). The remaining displacements, the force balance and the stresses follow from the contact forces. This module
+is the place to start reading the code.
 """
 
 from __future__ import annotations
