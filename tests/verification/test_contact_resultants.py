@@ -432,6 +432,26 @@ def test_bodies_wear_on_the_secondary_side(multipliers):
 
 
 @pytest.mark.parametrize("formulation", ["continuous", "mortar"])
+def test_the_wear_of_a_node_that_opens_under_friction_ends_a_step(formulation, caplog):
+    """The left end of the side that wears faster opens in a step, which changes its wear by a jump: no depth fits exactly."""
+    mesh = block((2.0, 1.0), (8, 4), origin=(-1.0, 0.0))
+    for name, sign in (("SLOW", -1.0), ("FAST", 1.0)):
+        mesh = mesh.with_facet_group(name, lambda x, s=sign: (x[:, 1] < 1e-9) & (s * x[:, 0] > -1e-9))
+    model = elastic_model(mesh, "plane_stress", TOP="x")
+    model.prescribe("TOP", y=-0.01, ramp=PRESS)
+    floor, coefficients = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)), {"SLOW": 1e-3 / 3.0, "FAST": 1e-3}
+    for name, k in coefficients.items():
+        options = {"motion": {"x": 0.6}, "ramp": SLIDE, "friction": 0.1, "formulation": formulation, "wear": k}
+        model.add_obstacle(name, secondary=name, obstacle=floor, **options)
+    with caplog.at_level("INFO", logger="fastcontact"):
+        steps = fc.solve(model, [1.0, 2.0, 3.0, 4.0])
+    assert "wear depths do not converge" in caplog.text
+    for name, k in coefficients.items():
+        work = sum(step.contact[name].dissipation for step in steps)
+        assert volume(steps[-1].contact[name]) == pytest.approx(k * work / 0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["continuous", "mortar"])
 def test_pressures_do_not_oscillate_in_large_steps(formulation):
     """With the wear of a step added at its end, pressures would alternate from node to node by 20 % of their mean."""
     smooth = fc.solve(shoe(formulation, wear=4e-5), np.linspace(1.0, 91.0, 46))[-1].contact["sole"]
