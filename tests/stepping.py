@@ -21,12 +21,12 @@ def watching() -> Iterator[Watched]:
     """Keep the settled contact of the last load step that is solved inside."""
     found = Watched()
 
-    def watched(*given, solve=page.newton):
+    def watched(*given, solve=page.newton_with_wear):
         solution = solve(*given)
         found.settled = solution.settled
         return solution
 
-    with patch.object(page, "newton", watched):  # not in the search for other equilibria
+    with patch.object(page, "newton_with_wear", watched):  # not in the search for other equilibria
         yield found
 
 

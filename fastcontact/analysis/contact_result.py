@@ -11,6 +11,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
+from fastcontact.analysis.work import ContactForces, contact_work
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -365,6 +366,22 @@ def sliding_load(
     at_once = solution.integrals is None
     sliding = np.where(solution.sticking[rows], 0.0, slip_integrals) if at_once else slip_integrals
     return np.maximum(closed_node_pressures(constraints, constraints.normal_forces(sliding), closed, side)[1], 0.0)
+
+
+def with_work(
+    pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
+    contact: ContactResult, before: ContactForces | None,
+) -> tuple[ContactResult, ContactForces, tuple[float, float, float]]:  # fmt: skip
+    """Return the result of a pair with its frictional work, its contact forces, and its work in the step.
+
+    For the parameters, and for the last two values, see `contact_work`.
+    """
+    forces, work, slip_integrals = contact_work(pair, constraints, solution, rows, configuration, contact, before)
+    load_of_pair = None
+    if pair.friction:
+        closed = contact.active if before is None else contact.active | (before.pressing > 0.0)
+        load_of_pair = sliding_load(constraints, solution, rows, slip_integrals, closed, pair.secondary)
+    return replace(contact, dissipation=work[0], sliding_load=load_of_pair), forces, work
 
 
 def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:

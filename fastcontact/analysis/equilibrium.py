@@ -12,7 +12,7 @@ The pressure of a fluid between the contact surfaces is a term.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import itemgetter
 from typing import Any, Protocol
 
@@ -26,6 +26,7 @@ from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
+from fastcontact.contact.wear_compliance import WearCompliance
 from fastcontact.elasticity.nonlinear_bodies import COMPLETE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness
 from fastcontact.errors import ConvergenceError
@@ -316,6 +317,8 @@ class StepEquilibrium:
         Terms of the equilibrium; None if all bodies are linear.
     newton : list of dict
         Convergence data of each Newton iteration; empty if all bodies are linear.
+    wear : dict of str to WearCompliance
+        Wear of each contact pair with a law of wear.
     """
 
     settled: SettledContact | None
@@ -323,6 +326,7 @@ class StepEquilibrium:
     balance: Balance
     terms: Terms | None = None
     newton: list[dict[str, Any]] = field(default_factory=list)
+    wear: Mapping[str, WearCompliance] = field(default_factory=dict)
 
     def counts(self, linear_iterations: int) -> dict[str, Any]:
         """Return the numbers of iterations of the step, see `StepResult.iterations`.

@@ -15,13 +15,13 @@ of second order.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from fastcontact._tools.records import field, record, replace
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged, nearest_nodes
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE

@@ -1,9 +1,10 @@
 """Solve one load step: evaluate loads, iterate to equilibrium with contact, and compute results.
 
 First the loads and the prescribed displacements at the end of the step are evaluated. Newton's method (`newton`) then solves
-the equilibrium. Each of its iterations pairs the contact surfaces on the deformed configuration, solves the inequalities of
-contact, and repeats both until the displacements converge (`geometry_loop`). The remaining displacements, the force balance
-and the stresses follow from the contact forces. This module is the place to start reading the code.
+the equilibrium, repeatedly where surfaces wear (`wear_iteration`). Each of its iterations pairs the contact surfaces on the
+deformed configuration, solves the inequalities of contact, and repeats both until the displacements converge
+(`geometry_loop`). The remaining displacements, the force balance and the stresses follow from the contact forces. This module
+is the place to start reading the code.
 """
 
 from __future__ import annotations
@@ -18,16 +19,15 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import unchecked
 from fastcontact.analysis import thermal_coupling
-from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, sliding_load
+from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, with_work
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.resultants import reference_reactions
 from fastcontact.analysis.state import State
-from fastcontact.analysis.wear import Worn
-from fastcontact.analysis.work import contact_work
+from fastcontact.analysis.wear import Worn, wear_work
+from fastcontact.analysis.wear_iteration import newton_with_wear
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.cohesive_layer import CohesiveLayer
 from fastcontact.elasticity import recovery
@@ -70,12 +70,13 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     step = prepare_start(problem, state, index, load)
-    temperatures, solution = None, newton(step, load)
+    temperatures, solution = None, newton_with_wear(step, load)
     if problem.heat is not None:
         temperatures, solution = thermal_coupling.settle_heat(
-            problem, step.state, load_without_conduction, instant, rise, solution, partial(newton, step)
+            problem, step.state, load_without_conduction, instant, rise, solution, partial(newton_with_wear, step)
         )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
+    step = replace(step, state=replace(step.state, wear=solution.wear))
     if temperatures is None:
         return _end_of_step(step, solution, instant, None, iterations)
     end, result = _end_of_step(step, solution, instant, temperatures.rise, iterations)
@@ -208,7 +209,7 @@ def _contact_at_end(
     results = contact_results(problem, start, load, settled, replace(end, first_contact=first_contact))
     touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
     never_opening, worn, slipped = dict(start.never_opening), dict(start.worn), dict(start.slipped)
-    forces, elastic_slip, bonds, work_increments = dict(start.forces), {}, {}, np.zeros(3)
+    forces, elastic_slip, bonds, work_increments, work_on_wear = dict(start.forces), {}, {}, np.zeros(3), 0.0
     for name, configuration in configurations.items():
         pair, constraints, rows = problem.pairs[name], parts[name], rows_of_pairs[name]
         if pair.options.kind == "bilateral_once_closed":
@@ -231,28 +232,23 @@ def _contact_at_end(
             bonds[name] = constraints.tied.bond_after(constraints, end.u)
             contact = replace(contact, damage=bonds[name].at(contact.coordinates)[1])
         elif pair.options.kind not in ("tied", "gap_only"):
-            before = start.forces.get(name)
-            arguments = constraints, solution, rows, configuration, contact, before
-            forces[name], work_of_pair, slip_integrals = contact_work(pair, *arguments)
-            load_of_pair = None
-            if pair.friction:
-                closed = contact.active if before is None else contact.active | (before.pressing > 0.0)
-                load_of_pair = sliding_load(constraints, solution, rows, slip_integrals, closed, pair.secondary)
-            contact = replace(contact, dissipation=work_of_pair[0], sliding_load=load_of_pair)
+            arguments = pair, constraints, solution, rows, configuration, contact
+            contact, forces[name], work_of_pair = with_work(*arguments, start.forces.get(name))
             work_increments += work_of_pair
         if pair.options.wear is not None:
-            wear = start.worn.get(name, Worn.nothing(len(contact.points)))
-            worn[name] = wear.after(pair, configuration, contact, pair.options.wear)
+            earlier = start.worn.get(name, Worn.nothing(len(contact.points)))
+            worn[name] = earlier.after(pair, configuration, contact, pair.options.wear)
             contact = replace(contact, wear=worn[name].depth)
+            work_on_wear += wear_work(worn[name].depth, earlier.depth, forces[name], start.forces.get(name))
         results[name] = contact
     stored = sum(map(attrgetter("stored"), (*forces.values(), *bonds.values())))
     released = sum(map(attrgetter("released"), bonds.values()))
     end = replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         last_change=settled.last_change, never_opening=never_opening, elastic_slip=elastic_slip, bonds=bonds, worn=worn,
-        slipped=slipped, forces=forces, touched=touched,
+        wear={}, slipped=slipped, forces=forces, touched=touched,
         first_contact={name: positions for name, positions in first_contact.items() if name in touched},
-        work=None if start.work is None else start.work.after(energy, stored, work_increments.tolist(), released),
+        work=start.work and start.work.after(energy, stored, work_increments.tolist(), released, work_on_wear),
     )  # fmt: skip
     return end, results
 

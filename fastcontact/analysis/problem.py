@@ -262,7 +262,8 @@ class Problem:
         u : ndarray (n_dofs,)
             All displacements, which include those of force-driven obstacles [length].
         """
-        zero, worn, side = np.zeros(self.model.mesh.dim), state.worn.get(name), self.pairs[name].secondary
+        zero, side, wear = np.zeros(self.model.mesh.dim), self.pairs[name].secondary, state.wear.get(name)
+        worn = wear or state.worn.get(name)
         depth = None if worn is None else at_points(side.points, worn.depth, self.model.mesh.n_points)
         return Configuration(
             displacement,
@@ -273,6 +274,7 @@ class Problem:
             state.never_opening.get(name),
             state.elastic_slip.get(name),
             depth,
+            wear,
             state.bonds.get(name),
             load.fluids.get(name, 0.0),
             linearisation_point=None if self.linearised_at is None else self.displacement(self.linearised_at),

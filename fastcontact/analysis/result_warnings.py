@@ -7,7 +7,6 @@ matters. It vanishes for a beam in bending, whose stresses cancel over the thick
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
@@ -22,7 +21,7 @@ from fastcontact.analysis.interpenetration import Peak, interpenetration
 from fastcontact.analysis.locking import ALTERNATING, locking_warnings
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
-from fastcontact.analysis.wear import stability_ratio
+from fastcontact.analysis.wear import ratio_to_elastic_waves
 from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
@@ -57,7 +56,7 @@ WARNING_RATIO = 0.1
 # Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
 # bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.
 OUT_OF_BALANCE = 0.03
-# Largest recommended factor by which to increase the number of steps. A larger factor indicates a wrong coefficient of wear.
+# Factor by which load steps are too large for the wear of single facets, above which the coefficient of wear may be wrong.
 LARGEST_STEP_FACTOR = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `pressure_oscillation`. On other
 # facets the limit is ALTERNATING.
@@ -121,7 +120,7 @@ def result_warnings(
             texts = [*_coarse_contact(pair, peak, state), *pressure_oscillation(pair, peak, problem.model)]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += [*pressures, *_pressure_peak_at_edge(pair, last, contact), *_sliding_past_ends(pair, contact)]
-        warnings += _unstable_wear(name, pair, state)
+        warnings += _excessive_wear(name, pair, state)
     warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_energy_imbalance(state)]
     return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]
 
@@ -176,9 +175,9 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
         )
 
 
-def _unstable_wear(name: str, pair: Formulation, state: State) -> Iterator[str]:
-    """Yield a warning where a contact wears faster than its load steps can follow."""
-    if name not in state.worn or (factor := stability_ratio(pair, state.worn[name])) <= 1.0:
+def _excessive_wear(name: str, pair: Formulation, state: State) -> Iterator[str]:
+    """Yield a warning where the coefficient of wear is probably in another unit."""
+    if name not in state.worn or (factor := ratio_to_elastic_waves(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
     if factor > LARGEST_STEP_FACTOR or depth > WARNING_RATIO * size:
@@ -186,11 +185,6 @@ def _unstable_wear(name: str, pair: Formulation, state: State) -> Iterator[str]:
             f"contact '{name}' has a wear depth of {depth:.3g}, {depth / size:.2g} times the size of the model, and load "
             f"steps that are {factor:.2g} times too large for this wear: is the option 'wear' Archard's coefficient divided "
             "by the hardness, in units of 1/pressure?"
-        )
-    else:
-        yield (
-            f"contact '{name}' wears so much in a load step that pressures may oscillate from node to node and depths are "
-            f"too large: use {math.ceil(factor)} times as many steps, or larger elements"
         )
 
 

@@ -15,6 +15,7 @@ from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
+from fastcontact.contact.wear_compliance import WearCompliance
 
 # Keys of restart data, with the attributes of `State` that they store: data of each contact pair, and numbers. Then the
 # attributes that are stored under their names: those with arrays, of which early versions stored only some, and those with
@@ -54,6 +55,8 @@ class State:
         Rotation angle of each rotating rigid obstacle, by the name of its contact pair [radian].
     worn : dict of str to Worn
         Wear of each contact pair with a law of wear.
+    wear : dict of str to WearCompliance
+        Wear of the current load step for each contact pair with a law of wear, while the step is solved.
     slipped : dict of str to ndarray (n_nodes, dim)
         Accumulated slip of the secondary nodes of each contact pair [length].
     never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
@@ -108,6 +111,7 @@ class State:
     obstacles: Mapping[str, Array] = field(default_factory=dict)
     angles: Mapping[str, float] = field(default_factory=dict)
     worn: Mapping[str, Worn] = field(default_factory=dict)
+    wear: Mapping[str, WearCompliance] = field(default_factory=dict)
     slipped: Mapping[str, Array] = field(default_factory=dict)
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)

@@ -10,10 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastcontact.arrays import Array, Numbers
+from fastcontact.analysis.work import ContactForces
+from fastcontact.arrays import Array, Numbers, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.contact.wear_compliance import WearCompliance
 from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
 
@@ -67,11 +69,52 @@ def wear_depth_in_step(
     """
     if contact.sliding_load is not None:
         return coefficient * _linear_on_facets(pair, contact.sliding_load)
-    distance = np.linalg.norm(pair.nodal_slip(configuration), axis=1)
-    if pair.friction:
-        distance = np.where(contact.sticking, 0.0, distance)
     pressure = np.maximum(contact.pressure + earlier_pressure, 0.0)
-    return coefficient * 0.5 * _linear_on_facets(pair, pressure * distance)
+    return coefficient * 0.5 * _linear_on_facets(pair, pressure * _sliding_distance(pair, configuration, contact))
+
+
+def wear_compliance(
+    pair: Formulation, configuration: Configuration, contact: ContactResult, worn: Worn, forces: ContactForces,
+    coefficient: float,
+) -> WearCompliance:  # fmt: skip
+    """Return the wear of a load step, linearised about a solution of the step.
+
+    Parameters
+    ----------
+    pair : Formulation
+    configuration, contact, coefficient
+        See `wear_depth_in_step`.
+    worn : Worn
+        Wear at the end of the step for this solution.
+    forces : ContactForces
+        Contact forces of the solution.
+    """
+    slope = 0.5 * coefficient * _sliding_distance(pair, configuration, contact)
+    return WearCompliance(worn.depth, worn.pressure, slope, contact.coordinates, forces.pressure, forces.positions)
+
+
+def wear_work(depth: Array, earlier_depth: Array, forces: ContactForces, before: ContactForces | None) -> float:
+    """Return the work of the normal forces in a load step on the increase of the wear depth (m,) [energy].
+
+    `forces` and `before` are the contact forces at the end and at the beginning of the step, None before the first step. As
+    in `work`, nodes that are open at either of them do not count.
+    """
+    if before is None:
+        return 0.0
+    closed = (forces.pressing != 0.0) & (before.pressing != 0.0)
+    return 0.5 * float((forces.pressing + before.pressing)[closed] @ (depth - earlier_depth)[closed])
+
+
+def linearisation_error(pair: Formulation, wear: WearCompliance, after: WearCompliance) -> float:
+    """Return the largest error of the depth that `wear` predicts for the next solution, with the wear `after` [length]."""
+    linear_change = _linear_on_facets(pair, wear.slope * (after.nodal_pressure - wear.nodal_pressure))
+    return largest(after.depth - wear.depth - linear_change)
+
+
+def _sliding_distance(pair: Formulation, configuration: Configuration, contact: ContactResult) -> Array:
+    """Return the sliding distances (m,) of the secondary nodes in a load step; zero where they stick [length]."""
+    distance = np.linalg.norm(pair.nodal_slip(configuration), axis=1)
+    return np.where(contact.sticking, 0.0, distance) if pair.friction else distance
 
 
 def _linear_on_facets(pair: Formulation, values: Array) -> Array:
@@ -105,13 +148,13 @@ def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
     return depths
 
 
-def stability_ratio(pair: Formulation, worn: Worn) -> float:
-    """Return the ratio of the wear per step to its stability limit [-]; above 1, pressures may oscillate from node to node.
+def ratio_to_elastic_waves(pair: Formulation, worn: Worn) -> float:
+    """Return the ratio of the wear per step to that which levels the shortest waves of the surface [-].
 
     Let h be the length of a facet edge, and E* the contact modulus. A wave of the gap with the wavelength 2 h causes
-    pressures of ``pi E* / (2 h)`` times its amplitude (Johnson, Contact Mechanics, 1985, section 13.2). The wear of a step
-    is computed with the mean of the pressures at its beginning and end, and changes the gaps in the next step. The wave
-    decays if the product of `Worn.largest_rate` and this stiffness is less than two. For pressures at integration points the
-    stiffness is up to twice as large, so that the limit used here is one.
+    pressures of ``pi E* / (2 h)`` times its amplitude (Johnson, Contact Mechanics, 1985, section 13.2). If half the product
+    of `Worn.largest_rate` and this stiffness is 1, the wear of one step levels such waves. With a larger product, their
+    pressures change sign in each step and decrease more slowly. For pressures at integration points, the stiffness is up to
+    twice as large, so that the ratio is the product itself.
     """
     return worn.largest_rate * np.pi * pair.modulus / (2.0 * pair.shortest_edge)

@@ -6,8 +6,8 @@ beginning or the end of the step. Sliding friction has its limit traction during
 beginning. If a contact moves over a surface, its force acts during the complete step, although constraints close and open.
 
 The external work is the sum of the strain energy, the plastic and frictional work, the energies of penalties and cohesive
-layers, and the imbalance. The imbalance is the work of contact forces at constraints that stay closed or stick. It is an
-error of long steps, in which normals rotate.
+layers, the work of contact pressures on the wear depth, and the imbalance. The imbalance is the work of contact forces at
+constraints that stay closed or stick. It is an error of long steps, in which normals rotate.
 """
 
 from __future__ import annotations
@@ -103,6 +103,8 @@ class Work:
         Energy of penalties, of cohesive layers and of adhesion.
     released : float
         Energy dissipated by the damage of cohesive layers.
+    wear : float
+        Work of contact pressures on the increases of the wear depths.
     largest : float
         The largest of these values in all steps so far.
     plastic : float
@@ -117,13 +119,17 @@ class Work:
     largest: float = 0.0
     plastic: float = 0.0
     released: float = 0.0
+    wear: float = 0.0
 
     @property
     def external(self) -> float:
         """External work, done by loads, supports and obstacles [energy]."""
-        return self.strain_energy + self.plastic + self.friction + self.imbalance + self.stored + self.released
+        dissipated = self.plastic + self.friction + self.released + self.wear
+        return self.strain_energy + self.stored + dissipated + self.imbalance
 
-    def after(self, energy: tuple[float, float], stored: float, added: Sequence[float], released: float = 0.0) -> Work:
+    def after(
+        self, energy: tuple[float, float], stored: float, added: Sequence[float], released: float = 0.0, wear: float = 0.0
+    ) -> Work:  # fmt: skip
         """Return the work after another load step.
 
         Parameters
@@ -136,10 +142,12 @@ class Work:
             Increments of `friction`, `touching` and `imbalance`, see `contact_work`, summed over all pairs [energy].
         released : float
             Energy dissipated by cohesive layers so far [energy].
+        wear : float
+            Increment of `wear` [energy].
         """
         friction, touching, imbalance = added
         sums = self.friction + friction, self.touching + touching, self.imbalance + imbalance
-        work = Work(energy[0], *sums, stored, plastic=energy[1], released=released)
+        work = Work(energy[0], *sums, stored, plastic=energy[1], released=released, wear=self.wear + wear)
         terms = (self.largest, *energy, work.friction, abs(work.external))
         return replace(work, largest=max(terms))
 
@@ -149,7 +157,7 @@ class Work:
             "strain_energy": self.strain_energy, "plastic_work": self.plastic,
             "external_work": self.external, "friction_work": self.friction,
             "friction_while_touching": self.touching, "penalty_energy": self.stored,
-            "energy_released": self.released, "imbalance": self.imbalance,
+            "energy_released": self.released, "wear_work": self.wear, "imbalance": self.imbalance,
         }  # fmt: skip
 
 
@@ -315,6 +323,7 @@ def _forces(
     inverse_area = 1.0 / np.where(constraints.finite_areas > 0.0, constraints.finite_areas, np.inf)
     compliance = constraints.normal_compliance
     penetration = np.zeros(len(constraints)) if compliance is None else compliance.apply(normal)
+    penetration = penetration - constraints.wear_softness * normal
     if constraints.law is not None:  # The energy of the law is not that of a linear spring.
         energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * inverse_area)
         penetration = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)

@@ -66,7 +66,7 @@ def copy_case(case_path: Path, target: Path) -> list[Path]:
         files[target.parent / source.name] = source.read_bytes()
     for path in files:
         if path.exists():
-            raise FileError(f"'{path}' exists already: name another file with -o, or remove it first")
+            raise FileError(f"'{path}' already exists: name another file with -o, or remove it first")
     for path, content in files.items():
         with replacing(path) as temporary:
             temporary.write_bytes(content)

@@ -8,6 +8,7 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 from fastcontact.contact.obstacles.rigid_side import Pose
+from fastcontact.contact.wear_compliance import WearCompliance
 
 
 @record
@@ -31,7 +32,9 @@ class Configuration:
         Reference positions of the k constraints at the end of the previous load step, and their elastic slips [length]; None
         without tangential compliance.
     wear_depth : ndarray (n_points,), optional
-        Wear depth at the secondary nodes at the beginning of the load step, zero at other points [length]; None without wear.
+        Wear depth at the secondary nodes, zero at other points [length]; None without wear.
+    wear : WearCompliance, optional
+        Dependence of the wear depth on the contact pressure; None before the first solution of a load step.
     bond : Bond, optional
         State of the cohesive layer at the end of the previous load step; None without a layer, and before the first step.
     fluid_pressure : float
@@ -55,6 +58,7 @@ class Configuration:
     never_opening: tuple[Array, Mask] | None = None
     elastic_slip: tuple[Array, Array] | None = None
     wear_depth: Array | None = None
+    wear: WearCompliance | None = None
     bond: Bond | None = None
     fluid_pressure: float = 0.0
     pressure: Array | None = None

@@ -217,6 +217,8 @@ class Constraints:
         Whether each constraint is an equation, with a multiplier of either sign.
     softness : ndarray (m,)
         Compliance of each constraint along its normal, in addition to C [length / force].
+    wear_softness : ndarray (m,)
+        Part of `softness` that is due to wear and stores no energy [length / force].
     tangential_softness : ndarray (m,)
         Compliance of each constraint along its tangents [length / force].
     elastic_slip : ndarray (k, m)
@@ -258,6 +260,7 @@ class Constraints:
     slip0: Array = field(default_factory=np.empty(0).copy)
     equality: Mask = field(default_factory=np.empty(0, bool).copy)
     softness: Array = field(default_factory=np.empty(0).copy)
+    wear_softness: Array = field(default_factory=np.empty(0).copy)
     low_rank_compliance: Array = field(default_factory=np.empty(0).copy)
     tangential_softness: Array = field(default_factory=np.empty(0).copy)
     elastic_slip: Array = field(default_factory=np.empty(0).copy)
@@ -277,7 +280,8 @@ class Constraints:
         k, m = len(self.tangents), len(self.gap0)
         shapes: dict[str, tuple[int, ...]] = {"low_rank_compliance": (1 + k, m, 0)}
         shapes |= dict.fromkeys(("slip0", "elastic_slip"), (k, m))
-        shapes |= dict.fromkeys(("friction", "equality", "softness", "tangential_softness", "prescribed"), (m,))
+        of_each = "friction", "equality", "softness", "wear_softness", "tangential_softness", "prescribed"
+        shapes |= dict.fromkeys(of_each, (m,))
         for name, shape in shapes.items():
             if not (values := getattr(self, name)).size:
                 object.__setattr__(self, name, np.zeros(shape, values.dtype))

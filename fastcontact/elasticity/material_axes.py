@@ -106,9 +106,13 @@ def checked_axes(axes: Any) -> Axes:
         raise ModelError(f"the axes of a material {vectors.tolist()} contain a zero vector")
     vectors = vectors / lengths
     caption = f"the axes of a material {vectors.tolist()}"
-    cosine = np.abs(vectors @ vectors.T - np.eye(len(vectors))).max()
-    if cosine > SINGLE_PRECISION:
-        raise ModelError(f"{caption} are not at right angles: the cosine between two is {cosine:.3g}")
+    cosines = np.tril(vectors @ vectors.T, -1)
+    i, j = np.unravel_index(np.abs(cosines).argmax(), cosines.shape)
+    if abs(cosines[i, j]) > SINGLE_PRECISION:
+        angle = np.degrees(np.arccos(cosines[i, j]))
+        raise ModelError(
+            f"{caption} are not at right angles: the angle between vectors {j + 1} and {i + 1} is {angle:.8g} degrees"
+        )
     first, second = vectors[0], vectors[1] - (vectors[1] @ vectors[0]) * vectors[0]
     second /= np.linalg.norm(second)
     third = np.cross(first, second)

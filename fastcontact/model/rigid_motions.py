@@ -27,6 +27,8 @@ MODE_NAMES = {
     "plane_stress": ("translation along x", "translation along y", "rotation"),
     "3d": tuple(f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"),
 }
+# Words between the name of a body and the centre of one of its parts, in the name of the part.
+PART = ", the part around "
 # Gap changes and singular values are regarded as zero below this, for motions whose largest displacement is about 1.
 ZERO = 1e-8
 # A motion that contact does not stop within this multiple of the size of the model is unbounded.
@@ -100,18 +102,35 @@ class FreeMotions:
             rows_of_body: dict[str, list[int]] = {}
             for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()).tolist():
                 rows_of_body.setdefault(self.labels[i].body, []).append(i)
+            together: dict[tuple[str, bytes], list[str]] = {}  # bodies, or parts of a body that move as one
             for body, rows in rows_of_body.items():
-                by_body.setdefault(body, []).append(self._motion_of_body(column, rows))
+                motion = np.round(self._at_origin(column, rows), 6) + 0.0  # no negative zeros
+                together.setdefault((body.partition(PART)[0], motion.tobytes()), []).append(body)
+            for (whole, _), moving in together.items():
+                name = self._motion_of_body(column, rows_of_body[moving[0]])
+                by_body.setdefault(whole if len(moving) > 1 else moving[0], []).append(name)
         return {body: list(dict.fromkeys(motions)) for body, motions in by_body.items()}
+
+    def _at_origin(self, column: Array, rows: list[int]) -> Array:
+        """Return the translation at the origin and the rotation (2, 3) of a body."""
+        translation, rotation, centre = self._translation_and_rotation(column, rows)
+        arm = np.zeros(3) if centre is None else np.pad(centre, (0, 3 - len(centre)))
+        return np.stack([translation - np.cross(rotation, arm), rotation])
+
+    def _translation_and_rotation(self, column: Array, rows: list[int]) -> tuple[Array, Array, Array | None]:
+        """Return the translation (3,) and the rotation (3,) of a body, and the point on the axis of the latter, if any."""
+        translation, rotation = np.zeros((2, 3))
+        labels = [self.labels[i] for i in rows]
+        for i, label in zip(rows, labels, strict=True):
+            axis = "xyz".find(label.motion[-1])  # in the plane it is -1, and the "rotation" is about z
+            (translation if label.centre is None else rotation)[axis] += column[i] / label.arm
+        return translation, rotation, next((label.centre for label in labels if label.centre is not None), None)
 
     def _motion_of_body(self, column: Array, rows: list[int]) -> str:
         """Return the name of the motion of a body: a rotation about a point or line if possible, else elementary motions."""
         labels = [self.labels[i] for i in rows]
-        translation, rotation = np.zeros((2, 3))
-        for i, label in zip(rows, labels, strict=True):
-            axis = "xyz".find(label.motion[-1])  # in the plane it is -1, and the "rotation" is about z
-            (translation if label.centre is None else rotation)[axis] += column[i] / label.arm
-        centre, square = next((label.centre for label in labels if label.centre is not None), None), rotation @ rotation
+        translation, rotation, centre = self._translation_and_rotation(column, rows)
+        square = rotation @ rotation
         size = max(label.arm for label in labels)
         if centre is None or abs(translation @ rotation) > 1e-6 * square * size:
             return " with ".join(label.motion for label in labels)
@@ -125,11 +144,21 @@ class FreeMotions:
 
 
 def grouped_by_body(names: Iterable[str]) -> str:
-    """Return the `names` of motions, see `FreeMotions.names`, in one string that names each body once."""
-    by_body: dict[str, list[str]] = {}
-    for body, _, motion in (name.rpartition(": ") for name in names):
-        by_body.setdefault(body, []).append(motion)
-    return "; ".join(f"{body}: {', '.join(motions)}" for body, motions in by_body.items())
+    """Return the `names` of motions, see `FreeMotions.names`, in one string that names each body once.
+
+    The motions of parts of a body, such as the halves of a cut bolt, follow those of the complete body.
+    """
+    by_body: dict[str, dict[str, list[str]]] = {}
+    for name, _, motion in (name.rpartition(": ") for name in names):
+        body, separator, centre = name.partition(PART)
+        part = separator.removeprefix(", ") + centre
+        by_body.setdefault(body, {}).setdefault(part, []).append(motion)
+    texts = []
+    for body, motions in by_body.items():
+        whole = f": {', '.join(motions.pop(''))}; " if "" in motions else ", "
+        parts = (f"{part}: {', '.join(listed)}" for part, listed in motions.items())
+        texts.append(f"{body}{whole}{'; '.join(parts)}".removesuffix("; "))
+    return "; ".join(texts)
 
 
 def _column_echelon_form(A: Array) -> Array:
@@ -165,7 +194,7 @@ def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
     if size == len(members):
         return group
     centre = mesh.points[members].mean(axis=0)
-    return f"{group}, the part around {_vector_text(centre)}" if group else f"number {number + 1} (around {centre})"
+    return f"{group}{PART}{_vector_text(centre)}" if group else f"number {number + 1} (around {centre})"
 
 
 def _group_of(mesh: Mesh, members: Indices) -> tuple[str, int]:

@@ -561,13 +561,14 @@ class StepResult(NameSuggestions):
           treated as external forces.
         - ``plastic_work``: work of plastic deformation.
         - ``external_work``: work of loads, supports, obstacles and thermal strains, and that of contact pressures on
-          changes of the gap by wear and `clearance_ramp`.
+          changes of the gap by `clearance_ramp`.
         - ``friction_work``: work dissipated by friction.
         - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which their
           gaps close, unless they take over the forces of other nodes, and in the step in which a contact is lost. It is
           overestimated in long steps.
         - ``penalty_energy``: energy of penalties and cohesive layers, and of the small compliance of pressure fields.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
+        - ``wear_work``: work of contact pressures on the wear depth, by which bodies approach each other.
         - ``imbalance``: external work minus the sum of all other energies.
 
         The dict is empty if the result file was written by a version that did not store these values, and in steps that

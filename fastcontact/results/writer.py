@@ -453,7 +453,7 @@ def _check_replaceable(path: Any, overwrite: bool) -> None:
     if not path.exists() or not path.stat().st_size:
         return
     if not overwrite:
-        raise FileError(f"'{path}' exists already: name another file or allow it to be overwritten")
+        raise FileError(f"'{path}' already exists: name another file or allow it to be overwritten")
     is_result = h5py.is_hdf5(path)
     if is_result:
         with contextlib.suppress(OSError), h5py.File(path, "r", locking=False) as file:

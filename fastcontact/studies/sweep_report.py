@@ -203,41 +203,41 @@ class Sweep(Report):
         })  # fmt: skip
 
     def table(self) -> AnyArray:
-        """Return a structured array (n_points,) with a row for each solved point, as ``--csv`` writes it.
-
-        Points that could not be solved are in `failed` and have no row. In `to_pandas` they have one.
+        """Return a structured array (n_points,) with a row for each point, as ``--csv`` writes it.
 
         The fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s] and, for each quantity, its value
         [unit of the quantity] and, if known, the relative differences ``..._from_theory``, ``..._from_theory_at_equal_force``
         and ``..._from_reference`` [-]. A result that has the name of a parameter, such as ``force``, is in the field
         ``computed_force``.
+
+        If points could not be solved, their results are NaN, and the last field, ``failed``, is the reason; it is empty for
+        other points.
         """
-        points = self.points
-        columns = {name: [getattr(point, name) for point in points] for name in ("h", "n_dofs", "seconds")}
-        for name in self.quantities:
-            columns[name] = [point.values.get(name, math.nan) for point in points]
-            for comparison, key in DIFFERENCES.items():
-                columns[f"{name}_{key}"] = [point.ratio(name, comparison) - 1.0 for point in points]
+        solved = {tuple(point.parameters.values()): point for point in self.points}
+        reasons = {tuple(choice.values()): text for choice, text in self.failed}
+        choices = [choice for choice in itertools.product(*self.parameters.values()) if choice in {**solved, **reasons}]
+        rows = [self._row(solved[choice]) if choice in solved else {} for choice in choices]
+        names = dict.fromkeys(name for row in rows for name in row)
+        columns: dict[str, Sequence[Any]] = {name: [row.get(name, math.nan) for row in rows] for name in names}
+        if reasons:
+            columns["failed"] = [reasons.get(choice, "") for choice in choices]
         results = {f"computed_{name}" if name in self.parameters else name: values for name, values in columns.items()}
-        return self.structured_known({name: [p.parameters[name] for p in points] for name in self.parameters} | results)
+        return self.structured_known(dict(zip(self.parameters, zip(*choices, strict=True), strict=True)) | results)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return `table` as a ``pandas.DataFrame``, see `Report`.
+        """Return `table` as a ``pandas.DataFrame``, see `Report`; the reason is missing at points that were solved."""
+        frame = super().to_pandas()
+        if self.failed:
+            frame["failed"] = frame["failed"].replace("", None)
+        return frame
 
-        Points that could not be solved have a row with their parameters and NaN, and the column ``failed`` has the reason.
-        """
-        solved = super().to_pandas()
-        if not self.failed:
-            return solved
-        import pandas
-
-        rows = pandas.concat([solved, pandas.DataFrame([choice | {"failed": text} for choice, text in self.failed])])
-        choices = list(itertools.product(*self.parameters.values()))
-        choices_of_rows = rows[list(self.parameters)].itertuples(index=False, name=None)
-        order = np.argsort([choices.index(choice) for choice in choices_of_rows], kind="stable")
-        rows = rows.iloc[order].reset_index(drop=True)
-        rows.attrs = solved.attrs
-        return rows
+    def _row(self, point: Point) -> dict[str, Any]:
+        """Return the results of a point, by the names of the fields of `table`."""
+        row: dict[str, Any] = {name: getattr(point, name) for name in ("h", "n_dofs", "seconds")}
+        for name in self.quantities:
+            row[name] = point.values.get(name, math.nan)
+            row |= {f"{name}_{key}": point.ratio(name, comparison) - 1.0 for comparison, key in DIFFERENCES.items()}
+        return row
 
     def remarks(self) -> list[str]:
         """See `Report`."""

@@ -164,7 +164,7 @@ DOUBTS = [
               STEEL,
               supports(BOTTOM="xy"),
               '[obstacle.drum]\nsecondary = "TOP"\nshape = { kind = "sphere", centre = [0.0, 5.0], R = 5.0 }\n',
-              "motion = { y = -0.2 }\nrotation = { angle = 0.1, centre = [0.0, 5.0] }\nwear = 1.0\n",
+              'motion = { y = -0.2 }\nrotation = { angle = 0.1, centre = [0.0, 5.0] }\nwear = 1.0\nformulation = "node_to_segment"\n',
           ),
           r"contact 'drum' has a wear depth of \S+, \S+ times the size of the model, and load steps that are \S+ times too large for this wear: is the option 'wear' Archard's coefficient divided by the hardness, in units of 1/pressure\?"),
     doubt("a contact group lacks facets", lacking,

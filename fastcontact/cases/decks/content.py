@@ -320,10 +320,14 @@ class Content:
     initial_temperatures: list[Block] = field(default_factory=list)
     initial_stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
-    heat: str = ""  # as in `Step`, common to all steps
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     outputs: list[Location] = field(default_factory=list)
+
+    @property
+    def heat(self) -> str:
+        """`Step.heat` of the first step that conducts heat; empty if there is none."""
+        return next((step.heat for step in self.steps if step.heat), "")
 
     def note(self, location: Location | Located, text: str) -> None:
         """Add a note on the interpretation of a line."""

@@ -78,9 +78,8 @@ HEAT_LOADS = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
 
 
 def check_steps(content: Content) -> None:
-    """Set `content.heat` from the steps. Raises CaseError if the procedures or the loads of the steps are inconsistent."""
+    """Raise CaseError if the procedures or the loads of the steps are inconsistent."""
     first = next((step for step in content.steps if step.heat), None)
-    content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
         if first and step.heat != first.heat and (first.heat == "uncoupled" or number > content.steps.index(first)):
             raise step.error(

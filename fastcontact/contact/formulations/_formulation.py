@@ -245,12 +245,12 @@ class Formulation(ABC):
             )
         equality = self.never_opening(constraints.positions, config)
         constraints = replace(constraints, equality=equality, friction=config.friction_factor * constraints.friction)
-        if self.options.source is None:
-            return constraints
-        from fastcontact.contact.fluid_pressure import AreaVectors, with_fluid_pressure
+        if self.options.source is not None:
+            from fastcontact.contact.fluid_pressure import AreaVectors, with_fluid_pressure
 
-        areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
-        return with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
+            areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
+            constraints = with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
+        return constraints if config.wear is None else config.wear.added_to(constraints)
 
     def _with_penalties(self, constraints: Constraints, config: Configuration) -> Constraints:
         """Return the constraints with the compliances of normal and tangential penalties."""

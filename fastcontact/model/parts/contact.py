@@ -111,8 +111,8 @@ class ModelContact(ModelConnections):
             - ``slip``: definition of the slip. ``"symmetric"``, the default: a relative displacement that closes a gap
               along the mean normal of both sides is not slip. ``"primary"``: any relative displacement tangential to the
               primary side is slip, as in code_aster.
-            - ``wear``: Archard's wear coefficient divided by the hardness [1 / pressure]. At the end of each load step the
-              depth ``wear * pressure * slip`` is removed from the secondary side.
+            - ``wear``: Archard's wear coefficient divided by the hardness [1 / pressure]. In each load step, the depth
+              ``wear * pressure * slip`` is removed from the secondary side.
             - ``conductance``: heat flux per unit temperature difference [power / (area temperature)]: a number, which
               applies at closed points; a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping
               of ``"pressure"`` and ``"gap"`` to pairs. By default the contact is insulated.

@@ -229,7 +229,7 @@ def test_a_step_without_its_state_is_refused():
 
 def test_all_that_a_step_changes_is_kept_or_set_anew():
     """A field that the state learns must be looked at here."""
-    anew = {"rigid", "last_change"}  # as a step begins
+    anew = {"rigid", "last_change", "wear"}  # as a step begins
     learnt = {"solver"}  # from what the solver remembers
     heat = {"rise", "instant"}  # where heat is conducted: see test_heat
     names = {"u": "obstacles"}

@@ -73,7 +73,7 @@ def test_a_case_is_copied_with_its_mesh_and_runs_there(tmp_path, monkeypatch, ca
     assert main(["cases", "--copy", "press-fit"]) == 0
     assert (tmp_path / "press-fit.toml").read_text() == ready_made_case("press-fit").read_text()
     capsys.readouterr()
-    assert "exists already" in output_of(capsys, ["cases", "--copy", "press-fit"], 1)
+    assert "already exists" in output_of(capsys, ["cases", "--copy", "press-fit"], 1)
 
 
 @pytest.mark.parametrize(

@@ -163,3 +163,10 @@ def test_halves_of_a_cut_bolt_have_its_name_and_each_motion_is_listed_once():
     parts = [name.partition(": ")[0] for name in names]
     for part in ("'BOLT', the part around (0.5, 0.5)", "'BOLT', the part around (0.5, 1.5)", "'NUT'"):
         assert parts.count(f"body {part}") == 3
+    model = elastic_model(mesh, "plane_strain", NUT="xy")
+    model.add_pretension("bolt", "BOLT_CUT", opposite="BOLT_CUT opposite", force=1.0)
+    whole = r"4 rigid-body motions are not supported: body 'BOLT': translation along x, rotation about \(0\.5, 0\.5\); "
+    halves = (
+        r"the part around \(0\.5, 0\.5\): translation along y; the part around \(0\.5, 1\.5\): translation along y\."
+    )
+    refused(fc.ModelError, whole + halves, fc.solve, model, 1)

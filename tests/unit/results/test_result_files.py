@@ -534,7 +534,7 @@ def test_protected_folders_and_files() -> None:
 
 def test_files_that_must_not_be_replaced(tmp_path: Path, path: Path) -> None:
     before = write(path).read_bytes()
-    refused(FileError, r"exists already: name another file", ResultWriter, path, MESH, overwrite=False)
+    refused(FileError, r"already exists: name another file", ResultWriter, path, MESH, overwrite=False)
     assert path.read_bytes() == before
     ResultWriter(tmp_path / "new.vtkhdf", MESH, overwrite=False).close()
     case, mesh = tmp_path / "case.toml", tmp_path / "mesh.med"

@@ -174,7 +174,8 @@ def test_a_wrong_quantity_stops_a_sweep_at_its_first_point():
     assert "'x' is a function that failed" in sweep.failed[0][1]
     table = sweep.to_pandas()
     assert table["size"].tolist() == [0.5, 0.25]
-    assert table["failed"][1] == sweep.failed[0][1]
+    assert table["failed"].dropna().tolist() == [sweep.failed[0][1]]
+    assert sweep.table()["failed"].tolist() == ["", sweep.failed[0][1]]
     assert table["x"].isna().tolist() == [False, True]
 
 

@@ -1,5 +1,6 @@
 """Sweeps: numbers, tables and files, the store, failures that do not end the others."""
 
+import csv
 import json
 import re
 
@@ -65,9 +66,14 @@ def test_the_command_writes_what_it_shows_and_runs_nothing_twice(case, tmp_path,
     assert json.loads(files["json"].read_text())["points"] == points
 
 
-def test_a_failed_point_is_told_and_the_others_go_on(case, capsys):
+def test_a_failed_point_is_told_and_the_others_go_on(case, capsys, tmp_path):
+    table = tmp_path / "table.csv"
     arguments = ["sweep", str(case), "--set", "material[0].nu=0.3,0.6", "--level", "0", "--workers", "1"]
-    assert main(arguments) == 2
+    assert main([*arguments, "--csv", str(table)]) == 2
+    solved, failed = csv.DictReader(table.open())
+    assert (failed["material[0].nu"], failed["force"], solved["failed"]) == ("0.59999999999999998", "nan", "")
+    assert "nu = 0.6" in failed["failed"]
+    assert float(solved["force"]) > 0.0
     shown = capsys.readouterr()
     assert "material[0].nu = 0.6 failed: " in shown.out
     assert "0.6" in shown.err
