@@ -74,7 +74,7 @@ def test_meshes_that_do_not_match_converge_as_fast_with_mortar():
 @pytest.mark.parametrize("smooth", [False, True])
 def test_continuous_pressures_follow_the_circles(smooth, swap):
     """The parabolas of facets of unequal length deviate from each other, if not smoothed."""
-    model, last = quarter("quad8", 10, 16, "continuous", swap, clearance=-0.001, surface_smoothing=smooth)
+    _, last = quarter("quad8", 10, 16, "continuous", swap, clearance=-0.001, surface_smoothing=smooth)
     exact = LAME.pressure * 0.001 / INTERFERENCE
     error = np.abs(last.contact["fit"].pressure / exact - 1).max()
     assert error < 0.05 if smooth else error > 0.09
