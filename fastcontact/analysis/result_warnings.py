@@ -72,7 +72,7 @@ NOTABLE_RESIDUAL = 1e-4
 # 0.7 times with standard multipliers. In press fits they are 1.7 times this ratio with standard multipliers.
 SLIDE_PAST_ENDS, SLIDE_PAST_ENDS_DUAL = 0.01, 0.3
 # Estimated pressure error due to integration over complete facets, over the mean pressure, above which a warning is given.
-QUADRATURE_ERROR = 0.03
+QUADRATURE_ERROR = 0.05
 # Smallest number of nodes for which the median is meaningful.
 MIN_NODES = 10
 # Number of the first step in which nothing determines the position of some bodies, the free motions of each of them by its
