@@ -128,6 +128,7 @@ OTHERWISE = {
     "no message: stiffness and forces are several times too large": (
         "nearly incompressible elements lock",
     ),
+    "no message: pressures are wrong from node to node": ("facets are integrated as a whole",),
     "no message: pressures follow the facets, not the curve": ("pressures that follow facets instead of arcs",),
     "no message: units are not checked, and results are wrong by a factor of a thousand or a million": (
         "E of one body in Pa, of the other in MPa", "E in Pa where MPa is named", "E in GPa where Pa is named",

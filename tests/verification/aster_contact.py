@@ -133,6 +133,8 @@ def _formulation(contact: Entry, zone: Entry, mesh: fc.Mesh, *, against_obstacle
         options = {"formulation": "node_to_segment"}
     else:
         options = {"formulation": "continuous", "integration": rule}
+        if not against_obstacle:
+            options["surface_smoothing"] = False
         if rule == "gauss":
             options["n_gauss"] = 3
     if not against_obstacle:

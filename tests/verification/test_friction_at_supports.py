@@ -220,6 +220,7 @@ CLAMPS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:contact .joint.. the integration points of complete facets")
 @pytest.mark.filterwarnings("ignore:supports push")
 @pytest.mark.parametrize("friction", [None, 0.3])
 @pytest.mark.parametrize(
@@ -252,6 +253,7 @@ def test_plates_clamped_at_the_same_edge_carry_their_load_on_every_mesh(element,
     assert contact.pressure == pytest.approx(1.0, abs=0.25 if method == "default" else 0.4)
 
 
+@pytest.mark.filterwarnings("ignore:contact .joint.. the integration points of complete facets")
 @pytest.mark.parametrize("element", ["quad4", "quad8", "tri6"])
 @pytest.mark.parametrize("method", ["default", "standard", "continuous"])
 def test_the_force_between_clamped_plates_is_accurate_on_coarse_meshes(element, method):

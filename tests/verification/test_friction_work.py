@@ -185,7 +185,8 @@ def test_works_that_do_not_add_up_are_told(count):
     model.add_spring("TOP", y=100.0)
     model.prescribe("TOP", x=-2.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
     drum = fc.obstacles.Sphere((0.0, -4.0), 4.0)
-    model.add_obstacle("drum", secondary="BOTTOM", obstacle=drum, motion={"y": 0.5}, ramp=[(0, 0), (1, 1), (2, 1)])
+    options = {"motion": {"y": 0.5}, "ramp": [(0, 0), (1, 1), (2, 1)], "integration": "gauss"}
+    model.add_obstacle("drum", secondary="BOTTOM", obstacle=drum, **options)
     steps = fc.solve(model, [1.0, *np.linspace(1.0, 2.0, count + 1)[1:]])
     told = any("out of balance" in text and "use more load steps" in text for text in steps[-1].warnings)
     assert told == (count == 1)

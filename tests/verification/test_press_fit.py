@@ -1,5 +1,8 @@
 """Press fits by a negative clearance compared with Lame: only the discretisation error remains."""
 
+import re
+import warnings
+
 import numpy as np
 import pytest
 from models import elastic_model, made_of, supported, united
@@ -47,7 +50,8 @@ def test_matching_meshes_leave_the_error_of_the_mesh(formulation, element, norma
     sizes = (3, 6, 9, 15)
     found = []
     for n in sizes:
-        model, last = quarter(element, n, n, formulation, swap, clearance=-INTERFERENCE, normals=normals)
+        options = {"normals": normals, "surface_smoothing": False}  # facets coincide
+        model, last = quarter(element, n, n, formulation, swap, clearance=-INTERFERENCE, **options)
         assert last.contact["fit"].active.all()
         found.append(errors(model, last)[1])
     assert rate(sizes, found) > expected
@@ -64,6 +68,40 @@ def test_meshes_that_do_not_match_converge_as_fast_with_mortar():
     assert rate(sizes, displacement) > 3.5
     assert abs(displacement[-1]) < 5e-5
     assert abs(pressure[-1]) < 1e-3
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("smooth", [False, True])
+def test_continuous_pressures_follow_the_circles(smooth, swap):
+    """The parabolas of facets of unequal length deviate from each other, if not smoothed."""
+    _, last = quarter("quad8", 10, 16, "continuous", swap, clearance=-0.001, surface_smoothing=smooth)
+    exact = LAME.pressure * 0.001 / INTERFERENCE
+    error = np.abs(last.contact["fit"].pressure / exact - 1).max()
+    assert error < 0.05 if smooth else error > 0.09
+
+
+@pytest.mark.parametrize("stiffness", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("around", [(24, 26), (26, 24)])
+def test_the_error_told_of_integration_over_complete_facets_is_right(around, stiffness):
+    """Blocks under a uniform pressure: its error does not depend on the size of the facets, but on the stiffer side."""
+    lower, upper = (fc.generate.block((1.0, 0.5), (n, n // 2), "quad8", (0.0, y)) for n, y in zip(around, (-0.5, 0.0)))
+    materials = {"L_BLOCK": fc.LinearElastic(1000.0, 0.3), "U_BLOCK": fc.LinearElastic(1000.0 * stiffness, 0.3)}
+    told, errors_of = [], []
+    for formulation in ("continuous", "mortar"):
+        model = made_of(united(L_=lower, U_=upper), "plane_strain", materials, L_BOTTOM="y")
+        supported(model, L_LEFT="x", L_RIGHT="x", U_LEFT="x", U_RIGHT="x")
+        model.add_pressure("U_TOP", 10.0)
+        model.add_contact("fit", secondary="U_BOTTOM", primary="L_TOP", formulation=formulation)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            contact = fc.solve(model, 1)[-1].contact["fit"]
+        texts = [str(w.message) for w in caught if "integration points of complete facets" in str(w.message)]
+        told.append(float(re.search(r"by about ([\d.]+),", texts[0])[1]) if texts else 0.0)
+        errors_of.append(np.abs(contact.pressure - 10.0).max())
+    assert told[1] == 0.0
+    assert errors_of[1] < 1e-8
+    assert bool(told[0]) == (stiffness > 0.5) == (errors_of[0] > 0.5)
+    assert not told[0] or 0.5 < errors_of[0] / told[0] < 1.6
 
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])

@@ -40,6 +40,36 @@ def test_moving_the_plane_is_moving_the_body():
     assert np.abs(one.stress - other.stress).max() < 1e-9 * np.abs(one.stress).max()
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("element", ["quad4", "quad8", "tri6"])
+@pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*are too stiff", "ignore:rotations of up to")
+def test_a_corner_that_touches_alone_does_not_penetrate(element, friction):
+    """A cantilever is bent by a plane at its lower corner: only there does it touch, and its force is that of the node."""
+    mesh = fc.generate.block((4.0, 1.0), (8, 2), element)
+    angle = np.radians(5.0)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    plane = fc.obstacles.HalfSpace((4.0 * np.cos(angle), -4.0 * np.sin(angle)), (0.0, 1.0))
+    forces = {}
+    for name, options in {
+        "default": {}, "gauss": {"integration": "gauss"}, "node": {"formulation": "node_to_segment"}
+    }.items():  # fmt: skip
+        model = elastic_model(mesh.replace(points=mesh.points @ turn.T), "plane_strain", LEFT="xy")
+        model.add_obstacle("c", secondary="BOTTOM", obstacle=plane, motion={"y": 0.05}, friction=friction, **options)
+        contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["c"]
+        assert contact.active.sum() == 1
+        forces[name] = np.linalg.norm(contact.force)
+    assert forces["default"] == pytest.approx(forces["node"], rel=1e-9)
+    assert forces["gauss"] < 0.97 * forces["node"]
+
+
+def test_facets_at_an_axis_keep_their_gauss_points():
+    mesh, contacts = fc.generate.quarter_disc("quad8"), []
+    for options in ({}, {"integration": "gauss"}):
+        model = half_sphere_on_plane(mesh, "continuous", **options)
+        contacts.append(fc.solve(model, fc.linear_ramp(1))[-1].contact["plane"])
+    assert contacts[0].pressure == pytest.approx(contacts[1].pressure, abs=1e-8 * PRESSURE)
+
+
 class Bowl:
     """The obstacle of the manufactured problem: its gap is measured along y, at the reference position."""
 

@@ -102,7 +102,7 @@ class Formulation(ABC):
         closes obliquely, as in code_aster.
     surface_smoothing : bool
         Whether to measure the gap between the smooth surfaces that the facets of curved sides approximate, see
-        `surface_smoothing`. Mortar sets it by default.
+        `surface_smoothing`. Mortar and continuous contact set it by default.
     options : PairOptions
         Options of the pair that do not depend on its formulation, such as its clearance.
     held_motions : HeldMotions, optional

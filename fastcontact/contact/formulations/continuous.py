@@ -5,12 +5,14 @@ The integration points are fixed on the secondary facets. See `_pressure_field` 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array, eye_array
+from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
@@ -24,16 +26,20 @@ from fastcontact.contact.integration import (
     facet_measure,
     fine_rule,
     gauss_rule,
+    mass_matrix,
 )
 from fastcontact.contact.pair_options import nodal_map
-from fastcontact.contact.pairing import Candidates, Normals, padded
-from fastcontact.contact.surface import FacetBlock
+from fastcontact.contact.pairing import Candidates, Normals, gap_rows
+from fastcontact.contact.projection import smooth_ends, smooth_normals
+from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import ROUND_OFF
 
 RULES = ("gauss", "simpson", "node")
+# Number of points in each direction of the rule with which others are compared, see `Continuous.quadrature_error`.
+FINE_POINTS = 10
 
 
 @dataclass(eq=False)
@@ -42,8 +48,9 @@ class Continuous(PressureFieldFormulation):
 
     Parameters
     ----------
-    integration : str
-        Quadrature rule of the integration points.
+    integration : str, optional
+        Quadrature rule of the integration points. By default they are Gauss points, except on facets in 2D that end at a
+        corner of the secondary side opposite a rigid obstacle. There they are the nodes, so that corners do not penetrate.
 
         - ``"gauss"``: Gauss points.
         - ``"simpson"``: Simpson's rule, on each half or quarter of a quadratic facet; a seven-point rule on triangles.
@@ -60,8 +67,9 @@ class Continuous(PressureFieldFormulation):
     """
 
     normals: Normals | None = "averaged"
+    surface_smoothing: bool = True
 
-    integration: str = "gauss"
+    integration: str | None = None
     n_gauss: int | None = None
 
     name: ClassVar[str] = "continuous"
@@ -70,28 +78,55 @@ class Continuous(PressureFieldFormulation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        local, areas, rules, smallest_size = [], [], [], np.inf
+        smallest_size = np.inf
         for block in self.secondary.blocks:
             xi, weights = self._rule(block.element)
-            local.append(np.repeat(block.local, len(xi), axis=0))
-            areas.append(self._areas(block, xi, weights))
-            rules.append(xi)
             size = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
             smallest_size = min(smallest_size, size.min() ** (1 / xi.shape[1]))
-        self._candidates = Candidates.in_facets(self.secondary, rules)
         rho = self.augmentation * self.modulus / smallest_size
-        full_areas = np.concatenate(areas)
+        self._candidates, full_areas = self._integration_points()
         usable_areas = np.where(self._candidates.belonging_to(self.excluded), 0.0, full_areas)
-        nodes = padded(local)
-        P = shapes_at(self._candidates.shape, nodes, len(self.secondary.points))
+        points = self._number_on_side[self._candidates.nodes], self._candidates.shape
+        P = shapes_at(points[1], points[0], len(self.secondary.points))
         field = self.with_common_values(self._independent_values(P, usable_areas))
-        points = nodes, self._candidates.shape
         flags = {"has_new_points": False, "eliminable": self.eliminable, "quadratic": self.secondary.order > 1}
         self._field = PressureField.of_points(points, (usable_areas, full_areas), float(rho), field, **flags)
 
+    def _integration_points(self) -> tuple[Candidates, Array]:
+        """Return the integration points, and their areas (m,) [area]."""
+        points, areas = self._points_of(self._rule)
+        at_corner = self._facets_at_corners()
+        if not at_corner.any():
+            return points, areas
+        nodes, nodal_areas = self._points_of(_at_nodes)
+        assert points.facet is not None
+        assert nodes.facet is not None
+        selected = np.concatenate([~at_corner[points.facet], at_corner[nodes.facet]])
+        arrays = [(getattr(points, f.name), getattr(nodes, f.name)) for f in fields(Candidates)]
+        *merged, areas = (np.concatenate(both)[selected] for both in [*arrays, (areas, nodal_areas)])
+        return Candidates(*merged), areas
+
+    def _points_of(self, rule: Callable[[str], quadrature.Rule]) -> tuple[Candidates, Array]:
+        """Return the points on all facets of a quadrature `rule`, given by element type, and their areas (m,) [area]."""
+        rules = [rule(block.element) for block in self.secondary.blocks]
+        areas = [self._areas(block, *of_block) for block, of_block in zip(self.secondary.blocks, rules, strict=True)]
+        return Candidates.in_facets(self.secondary, [xi for xi, _ in rules]), np.concatenate(areas)
+
+    def _facets_at_corners(self) -> Mask:
+        """Return the lines (n_facets,) that end at a corner opposite a rigid obstacle, see the option `integration`.
+
+        If only the corner touches, it would penetrate by the distance of the closest Gauss point times the slope.
+        """
+        if self.integration is not None or self.points.shape[1] == 3 or isinstance(self.primary, Surface):
+            return np.zeros(self.secondary.n_facets, bool)
+        smooth = smooth_ends(self.secondary, smooth_normals(self.secondary, self.points))
+        for _, nodes in self.symmetry_planes:
+            smooth |= np.isin(self.secondary.ends, nodes)
+        return np.asarray(~smooth.all(axis=1))
+
     def _rule(self, element: str) -> quadrature.Rule:
         """Return the integration points and weights on the reference facet of an element type."""
-        if self.integration not in RULES:
+        if self.integration not in (None, *RULES):
             raise ContactError(unknown("integration rule", self.integration, RULES))
         if self.integration == "simpson":
             return _simpson(element)
@@ -119,10 +154,10 @@ class Continuous(PressureFieldFormulation):
     def _areas(self, block: FacetBlock, xi: Array, weights: Array) -> Array:
         """Return the area (n_facets * n_q,) of each integration point [area].
 
-        If the points are the nodes, the areas are the integrals of the shape functions. A pressure field and its point forces
-        then have the same resultant, also in axisymmetric models, where the radius varies along the facet.
+        If the points `xi` are the nodes, the areas are the integrals of the shape functions. A pressure field and its point
+        forces then have the same resultant, also in axisymmetric models, where the radius varies along the facet.
         """
-        if self.integration != "node":
+        if not np.array_equal(xi, elements.get(block.element).nodes):
             measure = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric)
             return np.maximum(measure * weights, 0.0).ravel()
         N, measure = areas_of_rule(block, self.points, self.axisymmetric)
@@ -158,6 +193,27 @@ class Continuous(PressureFieldFormulation):
         if at_axis.any():  # There is no slip on the axis.
             constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
         return constraints
+
+    def quadrature_error(self, config: Configuration, pressure: Array) -> Array:
+        """Return the part (n_nodes,) of nodal pressures that the integration points do not transmit correctly [pressure].
+
+        The shape functions of the primary side have kinks within the secondary facets. The forces of the nodal `pressure`
+        (n_nodes,) on primary nodes therefore differ from those of a finer rule. The difference is converted to a pressure
+        with the mass matrix of the primary side, and projected onto the pressure field. On a uniform pressure, it does not
+        depend on the size of the facets.
+        """
+        primary, used = self.primary, self._field
+        assert isinstance(primary, Surface)
+        points, areas = self._points_of(lambda name: quadrature.product_rule(elements.get(name).linear, FINE_POINTS))
+        local = self._number_on_side[points.nodes], points.shape
+        fine = PressureField.of_points(local, (areas, areas), 1.0, (used.nodal_map, used.independent), False)
+        values, forces, rows = pressure[used.independent], [], csr_array((0, 0))
+        for candidates, projection in ((self._candidates, used.projection), (points, fine.projection)):
+            rows, _ = gap_rows(candidates, self.pair_candidates(candidates, config), primary, self.points)
+            forces.append((rows.T @ (projection.areas * (projection.P @ values))).reshape(self.points.shape))
+        mass, error = mass_matrix(primary, self.points, self.axisymmetric).tocsc(), np.zeros_like(self.points)
+        error[primary.points] = splu(mass).solve((forces[0] - forces[1])[primary.points])
+        return fine.pressure(areas * (rows @ error.ravel()))
 
     @cached_property
     def _at_axis(self) -> Mask:

@@ -85,8 +85,8 @@ class ModelContact(ModelConnections):
             - ``clearance_primary``: the same quantity as a function of positions on the primary side.
             - ``clearance_ramp``: history of both clearances, as pairs (instant, multiplier); by default they are constant.
             - ``friction_ramp``: history of the coefficient of friction, as pairs (instant, multiplier).
-            - ``surface_smoothing``: whether gaps are measured between the smooth surfaces that straight facets of curved
-              sides approximate; by default only with the mortar formulation.
+            - ``surface_smoothing``: whether gaps are measured between the smooth surfaces that facets of curved sides
+              approximate; by default, except for node-to-segment contact and at rigid obstacles.
             - ``excluded``: groups whose nodes carry no contact pressure. In the node-to-segment formulation and in mortar
               contact with one gap per node, the tributary areas of these nodes carry no pressure; in the other
               formulations, integration points whose nearest node is excluded carry none. The two sides may share excluded

@@ -133,8 +133,10 @@ def warned(model):
 
 
 @pytest.mark.parametrize(("options", "told"), [
-    ({}, False), ({"surface_smoothing": False}, True), ({"formulation": "continuous"}, True),
-    ({"formulation": "continuous", "divisions": (24, 24)}, False), ({"clearance": -5.0, "formulation": "continuous"}, False),
+    ({}, False), ({"surface_smoothing": False}, True), ({"formulation": "continuous"}, False),
+    ({"formulation": "continuous", "surface_smoothing": False}, True),
+    ({"formulation": "continuous", "surface_smoothing": False, "divisions": (24, 24)}, False),
+    ({"clearance": -5.0, "formulation": "continuous", "surface_smoothing": False}, False),
 ])  # fmt: skip
 def test_chords_that_push_sides_apart_are_told(options, told):
     texts = warned(fit(**options))[1]
