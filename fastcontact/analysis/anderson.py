@@ -13,7 +13,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 DEPTH = 5
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Anderson:
     """Anderson acceleration of the fixed-point iteration ``x = G(x)``.
 
@@ -35,7 +35,7 @@ class Anderson:
     where: Indices
     all_mixed: bool = True
     # Residuals and images of the last iterates.
-    _iterates: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
+    _iterates: list[tuple[Array, Array]] = field(default_factory=list, init=False)
 
     def restart(self) -> None:
         """Discard the earlier iterates, because G has changed."""

@@ -21,7 +21,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class FrictionIncrements:
     """Decision whether the friction of a load step is solved in increments, and in which pairings; see `geometry_loop`.
 

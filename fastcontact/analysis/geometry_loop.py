@@ -211,7 +211,7 @@ def _store_solution(
     iterate.history.append(entry | ({"rounded": True} if iterate.rounded else {}))
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class _Mixing:
     """Computation of the next iterate: by Newton's method while it converges, otherwise by Anderson acceleration.
 

@@ -35,7 +35,7 @@ from fastcontact.round_off import SINGLE_PRECISION, SUM_ROUND_OFF
 DISPLACEMENTS_UNTIL_DRY = 3
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Iterate:
     """Iterate of a load step between two pairings of the contact surfaces; `geometry_loop` modifies it.
 
@@ -215,7 +215,7 @@ def solve_inequalities(
     return solution, step.problem.dofs.displacement(solution.u, step.load.lift)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class _PairingProblem:
     """Contact problem of one pairing, see `solve_inequalities`."""
 
@@ -248,7 +248,7 @@ class _PairingProblem:
         return iterate.frictional
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class _FloatingContact(_PairingProblem):
     """Contact problem of one pairing if contact alone restrains some bodies, which springs hold.
 

@@ -39,7 +39,7 @@ WINDOW = 8
 DECLINE = 0.5
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Tolerances:
     """The tolerances of a load step.
 
@@ -103,7 +103,7 @@ class Tolerances:
         return max(max(self.criteria.geometry, relative_error) * size, self.round_off)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class ScatterWindow:
     """The last displacements and contact forces of a geometry loop, which show whether they only scatter by round-off."""
 

@@ -350,10 +350,10 @@ def generalised_forces(motions: FreeMotions, force: Array, largest: float = 0.0)
     return work
 
 
-def mechanisms(gaps: Array, works: Array) -> Array:
+def mechanisms(gaps: Array, forces: Array) -> Array:
     """Return the coefficients (k, j) of motions that neither contact nor contact and loads together can stop.
 
-    `gaps` (m, k) are the changes of the gaps and `works` (l, k) the generalised forces of the loads for each motion. The
+    `gaps` (m, k) are the changes of the gaps and `forces` (l, k) the generalised forces of the loads for each motion. The
     largest displacement of a motion is about 1. A motion is regarded as stopped if it closes a gap, or if it opens one and a
     load acts on it. The solution decides whether the load presses the body against the contact or pulls it away.
     """
@@ -362,11 +362,11 @@ def mechanisms(gaps: Array, works: Array) -> Array:
     without_gap_change = _null_space(gaps)
     if without_gap_change.shape[1]:
         return without_gap_change
-    scale = np.abs(works).max(axis=1, initial=0.0)
-    scaled_works = works[scale > 0] / scale[scale > 0, None]
+    scale = np.abs(forces).max(axis=1, initial=0.0)
+    scaled_forces = forces[scale > 0] / scale[scale > 0, None]
     for axis in range(k):
         for sign in (1.0, -1.0):
-            motion = _maximiser(sign * np.eye(k)[axis], gaps, np.zeros(len(gaps)), scaled_works, 1.0)
+            motion = _maximiser(sign * np.eye(k)[axis], gaps, np.zeros(len(gaps)), scaled_forces, 1.0)
             if np.abs(motion).max(initial=0.0) > 1e-6:
                 return motion[:, None]
     return np.empty((k, 0))

@@ -112,7 +112,7 @@ def solve(
     )
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class _Problem:
     """The problem of `solve` in scaled units, for `cone_newton.newton`; see `cone_newton.Linearised`.
 

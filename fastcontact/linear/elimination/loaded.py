@@ -23,7 +23,7 @@ log = logging.getLogger("fastcontact")
 REDUCTION = 0.3
 
 
-class LoadedIteration(Loaded):
+class LoadedIterative(Loaded):
     """A prepared matrix of an iterative solver with a right-hand side; see `linear.protocol.Loaded`.
 
     Parameters

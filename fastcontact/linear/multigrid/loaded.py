@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
-from fastcontact.linear.elimination.loaded import LoadedIteration
+from fastcontact.linear.elimination.loaded import LoadedIterative
 from fastcontact.linear.elimination.pivot_order import DependenceError
 from fastcontact.linear.field_compliance import FieldCompliance, FieldEquations
 from fastcontact.linear.multigrid.border import Border
@@ -31,8 +31,8 @@ log = logging.getLogger("fastcontact")
 LARGEST_STIFFNESS_RATIO = MILD_CONTRAST
 
 
-class LoadedMultigrid(LoadedIteration):
-    """A matrix prepared by a `Multigrid` solver, with a right-hand side; see `LoadedIteration`."""
+class LoadedMultigrid(LoadedIterative):
+    """A matrix prepared by a `Multigrid` solver, with a right-hand side; see `LoadedIterative`."""
 
     # Values of the pressure field at the edge of the contact in the last solution, as an initial guess for the next one.
     _at_edge: Array = np.empty(0)

@@ -18,7 +18,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.elimination.loaded import LoadedIteration, restore_tolerance, tighten
+from fastcontact.linear.elimination.loaded import LoadedIterative, restore_tolerance, tighten
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
 from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
 
@@ -118,9 +118,9 @@ class Pyamg(LinearSolver):
         """Return the multipliers (m,) of the equations at `u` (n,) [force]."""
         return np.empty(0) if elimination is None else elimination.multiplier((self.K @ u - f)[elimination.pivots])
 
-    def load(self, f: Array) -> LoadedIteration:
+    def load(self, f: Array) -> LoadedIterative:
         """Return the prepared matrix with right-hand side `f` (n,)."""
-        return LoadedIteration(self, f)
+        return LoadedIterative(self, f)
 
     def improve(self, excess: float) -> bool:
         """See `LinearSolver.improve`."""
