@@ -11,6 +11,14 @@ from fastcontact.errors import ModelError
 # Relative error of displacements or forces above which a warning is given. It is also the largest admissible value of
 # criteria, because with larger ones the result need not be close to the solution.
 NOTABLE = 1e-2
+# Ratio, or excess of a ratio over one, above which a warning is given. It applies to
+# - the frictional work of nodes in the steps in which they close, relative to the total frictional work;
+# - the work of the stresses on strains that linear kinematics neglect, relative to that on strains;
+# - strains, because the fraction of a strain that linear kinematics neglect is about as large as the strain;
+# - the wear depth, relative to the size of the model;
+# - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield;
+# - the length of the facets of one side, relative to that of the other side.
+WARNING_RATIO = 0.1
 # Largest number of times that the step of an iteration is halved: the iterations for displacements, for positions of floating
 # bodies, and for friction forces.
 HALVINGS = 6

@@ -149,10 +149,8 @@ def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[
         simplices = " and ".join(name for name in names if name in SIMPLICES)
         material, effect = "in a nearly incompressible material", "forces are too large"
         if linear:
-            material, effect = (
-                f"at nu = {_poisson_ratios(model, problem.field)[0].max():g}",
-                "contact pressures with it",
-            )
+            nu = _poisson_ratios(model, problem.field)[0].max()
+            material, effect = f"at nu = {nu:g}", "contact pressures with it"
         return [
             f"{simplices} cells lock: {material} their mean stress scatters by {mean_stress:.0%} about its averages at the "
             f"nodes, and {effect}; {OTHER_ELEMENTS}"

@@ -1,9 +1,4 @@
-"""Warnings about the accuracy and validity of a finished analysis, which result files store.
-
-In a rotation by a small angle, linear kinematics neglect the strain ``0.5 W.T @ W``, where W is the antisymmetric part of
-the displacement gradient. The work of the stresses on this strain, relative to that on the linear strain, shows whether it
-matters. It vanishes for a beam in bending, whose stresses cancel over the thickness, but not for a belt in tension.
-"""
+"""Warnings about the accuracy and validity of a finished analysis, which result files store."""
 
 from __future__ import annotations
 
@@ -15,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import dijkstra
 
-from fastcontact.analysis.criteria import NOTABLE, Criteria
+from fastcontact.analysis.criteria import NOTABLE, WARNING_RATIO, Criteria
 from fastcontact.analysis.facet_sag import facet_length, sag_warnings
 from fastcontact.analysis.interpenetration import Peak, interpenetration
+from fastcontact.analysis.kinematics_warnings import large_rotation, large_strain
 from fastcontact.analysis.locking import ALTERNATING, locking_warnings
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
@@ -30,35 +26,14 @@ from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.surface import Surface
-from fastcontact.elasticity import recovery
-from fastcontact.elasticity.energy import slopes_at
-from fastcontact.elasticity.incompatible_modes import PAIRS
-from fastcontact.elasticity.mass import cell_portions
-from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
-from fastcontact.elasticity.recovery import BATCH
-from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.mesh import elements
-from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.model import Model
-from fastcontact.model.rigid_motions import body_name
-from fastcontact.results.layout import cut_at_interfaces
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Ratio, or excess of a ratio over one, above which a warning is given. It applies to
-# - the frictional work of nodes in the steps in which they close, relative to the total frictional work;
-# - the work of the stresses on strains that linear kinematics neglect, relative to that on strains;
-# - strains, because the fraction of a strain that linear kinematics neglect is about as large as the strain;
-# - the wear depth, relative to the size of the model;
-# - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield;
-# - the length of the facets of one side, relative to that of the other side.
-WARNING_RATIO = 0.1
-# Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
-# bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.
-OUT_OF_BALANCE = 0.03
-# Factor by which load steps are too large for the wear of single facets, above which the coefficient of wear may be wrong.
+# Largest recommended factor by which to increase the number of steps. A larger factor indicates a wrong coefficient of wear.
 LARGEST_STEP_FACTOR = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `pressure_oscillation`. On other
 # facets the limit is ALTERNATING.
@@ -98,7 +73,7 @@ def result_warnings(
     warnings = interpenetration(problem, last, list(earlier.values()))
     warnings += [*_loaded_springs(problem, last), *_undetermined_positions(last, free_bodies)]
     if problem.model.strain == "small":
-        warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
+        warnings += [*large_strain(problem, last), *large_rotation(problem, state, last)]
     warnings += locking_warnings(problem, state, last)
     if reason := problem.solver.replacement_reason:
         warnings.append(f'{reason}. linear_solver="direct" factorises the matrix from the start')
@@ -303,88 +278,6 @@ def _undetermined_positions(last: StepResult, free_bodies: FreeBodies | None) ->
             f"nothing determines the position of bodies{when}, since no contact force acts against their motion ({names}): "
             f"any position without such a force is a solution; hold them by supports or weak springs, or load them{lost}"
         )
-
-
-def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
-    """Yield warnings where strains, or plastic strains, are too large for linear kinematics."""
-    strain = largest_strain(problem.model, last)
-    if strain > WARNING_RATIO:
-        yield (
-            f"the largest equivalent strain is {strain:.3f}, beyond the {WARNING_RATIO} up to which linear kinematics are "
-            "accurate"
-        )
-    else:
-        yield from _large_free_strain(problem, last)
-    plastic = last.cell_fields.get("plastic_strain")
-    if plastic is not None and (largest := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
-        yield (
-            f"the largest plastic strain is {largest:.2f}, beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics "
-            "are valid: contact pressures there are too low, under a ball by 10 % at 0.2; "
-            "strain='finite' has no such limit"
-        )
-
-
-def largest_strain(model: Model, step: StepResult) -> float:
-    """Return the largest equivalent elastic strain at the nodes of a model at the end of a step [-]."""
-    field, (mesh, _, stress) = model.material_field(), cut_at_interfaces(model.mesh, step)
-    largest_in_cells = 0.0
-    for name, block in mesh.solids.items():
-        compliance = field.compliance[field.rows[name]]
-        for nodes in block.T:
-            strain = recovery.equivalent_strain(np.einsum("cij,cj->ci", compliance, stress[nodes]))
-            largest_in_cells = max(largest_in_cells, float(strain.max(initial=0.0)))
-    return largest_in_cells
-
-
-def _large_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
-    """Yield a warning where temperatures or initial states cause large strains, which stresses need not show."""
-    model = problem.model
-    if not (model.temperatures or model.initial_states or model.conducts):
-        return
-    moduli = np.eye(problem.field.moduli.shape[1])[None]  # unit moduli: stresses are strains
-    rows = {name: np.zeros(len(block), np.int32) for name, block in model.mesh.solids.items()}
-    strain = float(np.abs(recovery.nodal_stress(model.mesh, model.kinematics, moduli, rows, last.displacement)).max())
-    if strain > WARNING_RATIO:
-        yield (
-            f"temperatures and initial states cause strains of {strain:.3g}, beyond the {WARNING_RATIO} up to which linear "
-            "kinematics are accurate: are they in the units of the model?"
-        )
-
-
-def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterator[str]:
-    angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
-    if angle**2 > WARNING_RATIO:  # the change of area that linear kinematics neglect
-        yield (
-            f"the largest rotation is {angle:.3f} rad, near {np.array2string(where, precision=4)}: linear kinematics "
-            f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
-        )
-        return
-    neglected, work_by_body = _work_on_strains(problem, last)
-    # Bodies whose work on strains is round-off relative to that of other bodies are free of stress.
-    least_work = max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY)
-    ratio = np.abs(neglected) / np.maximum(work_by_body, least_work)
-    # Even small rotations matter under large stresses. In bodies whose stresses are only due to neglected strains, the works
-    # on strains and on neglected strains are about equal.
-    is_preloaded = bool(((ratio > WARNING_RATIO) & (ratio < 0.5)).any())
-    friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
-    if angle > 0.5 * OUT_OF_BALANCE * friction or is_preloaded:
-        yield from _neglected_rotation(problem, last, angle, neglected, ratio)
-
-
-def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
-    """Return the largest rotation at the centre of a solid cell [radian], and its position (dim,).
-
-    In linear kinematics it is half the curl of the displacement (n_points, dim).
-    """
-    square, point = 0.0, np.zeros(mesh.dim)
-    for name, rows in cell_portions(mesh):
-        element, nodes = elements.get(name), mesh.cells[name][rows]
-        centre = element.nodes[: element.n_corners].mean(axis=0)[None]
-        slopes, _ = slopes_at(displacement[nodes], mesh.points[nodes], element.gradient(centre))
-        squares = ((slopes - slopes.transpose(0, 1, 3, 2)) ** 2).sum(axis=(1, 2, 3)) / 8.0
-        if squares.max() > square:
-            square, point = squares.max(), mesh.points[nodes[squares.argmax()]].mean(axis=0)
-    return float(square**0.5), point
 
 
 def _open_contact(problem: Problem, state: State, name: str, last: StepResult, loaded: bool) -> Iterator[str]:
@@ -619,93 +512,3 @@ def _alternation_matrix(side: Surface) -> csr_array:
         is_corner[block.local[:, : elements.get(block.element).n_corners]] = 1.0
     corners, others = diags_array(is_corner), diags_array(1.0 - is_corner)
     return csr_array(corners @ adjacency @ others + others @ adjacency @ corners)
-
-
-def _neglected_rotation(
-    problem: Problem, last: StepResult, angle: float, neglected: Array, ratio: Array
-) -> Iterator[str]:
-    """Yield a warning for the body in which linear kinematics neglect most.
-
-    `angle` is the largest rotation [radian], `neglected` (n_bodies,) the work on neglected strains [energy], and `ratio`
-    (n_bodies,) its magnitude relative to the work on strains [-].
-    """
-    mesh = problem.model.mesh
-    worst = int(np.argmax(ratio))
-    if ratio[worst] > WARNING_RATIO:
-        name = body_name(mesh, bodies(mesh)[1], worst)
-        comparison = f"{ratio[worst]:.0%} of their work on" if ratio[worst] <= 1.0 else "more work than on"
-        yield (
-            f"rotations of up to {angle:.2g} rad matter in body {name}: on the strains that linear kinematics neglect its "
-            f"stresses would do {comparison} strains. Solve the model with strain='finite'"
-        )
-        return
-    capacity = _frictional_capacity(problem, last)
-    # The moment out of balance does twice the neglected work in a rotation. The neglected strain also changes pressures.
-    error = ratio + np.divide(2.0 * np.abs(neglected), capacity, out=np.zeros(len(capacity)), where=capacity > 0.0)
-    worst = int(np.argmax(np.where(capacity > 0.0, error, 0.0)))
-    if capacity[worst] > 0.0 and error[worst] > OUT_OF_BALANCE:
-        name = body_name(mesh, bodies(mesh)[1], worst)
-        yield (
-            f"moments of friction on body {name} are wrong by up to {error[worst]:.1%}: it rotates by {angle:.2g} rad, "
-            "and linear kinematics apply forces at undeformed positions. Solve the model with strain='finite'"
-        )
-
-
-def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
-    """Return the largest work (n_bodies,) of contact forces with friction in the rigid-body motion of each body [energy].
-
-    It is zero for bodies that deform more than they rotate.
-    """
-    mesh, dim = problem.model.mesh, problem.model.mesh.dim
-    n_bodies, body = bodies(mesh)
-    capacity = np.zeros(n_bodies)
-    motion, rotation = np.zeros((2, *mesh.points.shape))
-    rotating = np.zeros(mesh.n_points, bool)
-    for number in range(n_bodies):
-        nodes = np.flatnonzero(body == number)
-        modes, u = rigid_modes(mesh.points[nodes], problem.model.kinematics), last.displacement[nodes].ravel()
-        amplitude = np.linalg.lstsq(modes, u)[0]
-        rotation[nodes] = (modes[:, dim:] @ amplitude[dim:]).reshape(-1, dim)
-        motion[nodes] = (modes @ amplitude).reshape(-1, dim)
-        rotating[nodes] = np.linalg.norm(u - motion[nodes].ravel()) < 0.5 * np.linalg.norm(rotation[nodes])
-    for name, pair in problem.pairs.items():
-        contact, friction = last.contact[name], pair.friction or 0.0
-        sides = (contact.points, contact.force_vectors), (contact.primary_points, contact.primary_force_vectors)
-        for points, force in sides if friction else ():
-            distance = np.maximum(np.linalg.norm(motion[points], axis=1), np.linalg.norm(rotation[points], axis=1))
-            friction_work = friction * np.linalg.norm(force, axis=1) * distance
-            work = np.maximum(friction_work, np.abs((force * motion[points]).sum(axis=1)))
-            np.add.at(capacity, body[points], rotating[points] * work)
-    return capacity
-
-
-def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
-    """Return the work of stresses on neglected strains, and the integral of its absolute value on linear strains.
-
-    Both are arrays (n_bodies,) [energy].
-    """
-    mesh, axisymmetric = problem.model.mesh, problem.model.kinematics == "axisymmetric"
-    count, body = bodies(mesh)
-    neglected, work_by_body = np.zeros((2, count))
-    for name, block in mesh.solids.items():
-        element = elements.get(name)
-        xi, weights = element.quadrature
-        N, dN = element.shape(xi), element.gradient(xi)
-        for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
-            slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
-            stress, volume = N @ last.stress[cells], np.abs(volume) * weights
-            stress_tensor = stress[..., PAIRS[mesh.dim]]
-            strain_work = np.einsum("cqij,cqij->cq", stress_tensor, slope)
-            if axisymmetric:
-                radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
-                volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_u / radius
-            rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
-            # The neglected strain is 0.5 W.T @ W = -0.5 W @ W, since the rotation W is antisymmetric.
-            neglected_work = -0.5 * np.einsum("cqij,cqij->cq", stress_tensor, rotation @ rotation)
-            strain, rotated = (np.einsum("cqij,cqij->cq", part, part) for part in (slope - rotation, rotation))
-            neglected_work[strain < SINGLE_PRECISION**2 * rotated] = (
-                0.0  # stresses of a rigid-body motion are round-off
-            )
-            np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
-            np.add.at(work_by_body, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
-    return neglected, work_by_body

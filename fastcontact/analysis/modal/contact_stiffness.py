@@ -29,9 +29,8 @@ def contact_stiffness(model: Model, step: StepResult, held: HeldMotions) -> csr_
     for pair in model.contact:
         formulation = model.bind(pair, held, sectors_alike=False)
         if formulation.options.kind not in ("gap_only", "tied"):
-            K += driven.contact_stiffness(
-                pair.name, _pair_stiffness(formulation, step, pair.name, model.strain == "finite")
-            )
+            stiffness = _pair_stiffness(formulation, step, pair.name, model.strain == "finite")
+            K += driven.contact_stiffness(pair.name, stiffness)
     return K
 
 

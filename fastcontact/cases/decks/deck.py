@@ -13,7 +13,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import html_table
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.result_warnings import largest_rotation, largest_strain
+from fastcontact.analysis.kinematics_warnings import largest_rotation, largest_strain
 from fastcontact.analysis.resultants import multipliers
 from fastcontact.analysis.run import solve_steps
 from fastcontact.arrays import Array, Numbers

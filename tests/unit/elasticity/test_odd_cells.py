@@ -5,7 +5,7 @@ import pytest
 from models import body_of
 
 import fastcontact as fc
-from fastcontact.analysis.result_warnings import largest_rotation
+from fastcontact.analysis.kinematics_warnings import largest_rotation
 from fastcontact.elasticity import stiffness
 from fastcontact.mesh import elements
 
