@@ -19,6 +19,7 @@ from fastcontact.analysis.load_step import load_step, prepare_start
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
+from fastcontact.analysis.wear_iteration import newton_with_wear
 from fastcontact.arrays import largest
 from fastcontact.errors import ConvergenceError
 from fastcontact.model.checks import facet_lengths
@@ -143,7 +144,8 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
     begin, frictionless = prepare_start(problem, state, index, load), dict.fromkeys(pairs, 0.0)
     frictionless_load = replace(load, friction_factors={**load.friction_factors, **frictionless})
     try:
-        u = newton(begin, load, newton(replace(begin, load=frictionless_load), frictionless_load)).u
+        frictionless_solution = newton(replace(begin, load=frictionless_load), frictionless_load)
+        u = newton_with_wear(begin, load, frictionless_solution).u
     except ConvergenceError:
         return False
     return largest(u - after.u) > NOTABLE * largest(after.u - state.u)
@@ -162,6 +164,8 @@ def _with_sums(substeps: list[StepResult]) -> StepResult:
     contact = {}
     for name, result in end.contact.items():
         parts = [substep.contact[name] for substep in substeps]
+        loads = [part.sliding_load for part in parts if part.sliding_load is not None]
+        sums = {"sliding_load": np.sum(loads, axis=0)} if loads else {}
         slip = np.sum([part.slip for part in parts], axis=0)
-        contact[name] = replace(result, dissipation=sum(part.dissipation for part in parts), slip=slip)
+        contact[name] = replace(result, dissipation=sum(part.dissipation for part in parts), slip=slip, **sums)
     return replace(end, contact=contact, iterations=iterations)

@@ -49,6 +49,8 @@ def test_a_step_that_fails_whole_ends_as_if_its_parts_had_been_asked_for():
     np.testing.assert_array_equal(found.sticking, expected.sticking)
     work = sum(part.contact["hertz"].dissipation for part in parts)
     assert found.dissipation == pytest.approx(work, rel=1e-8, abs=1e-12 * abs(found.force[1]))
+    loads = sum(part.contact["hertz"].sliding_load for part in parts)
+    assert found.sliding_load == pytest.approx(loads, rel=1e-6, abs=1e-9 * loads.max())
     assert step.iterations["linear_iterations"] >= 0
     assert len(step.iterations["history"]) > step.iterations["geometry_updates"] >= len(ends)
 
