@@ -699,7 +699,7 @@ def _work_on_strains(problem: Problem, last: StepResult, at_centres: bool = Fals
             # The neglected strain is 0.5 W.T @ W = -0.5 W @ W, since the rotation W is antisymmetric.
             neglected_work = -0.5 * np.einsum("cqij,cqij->cq", tensor, rotation @ rotation)
             strain, rotated = (np.einsum("cqij,cqij->cq", part, part) for part in (slope - rotation, rotation))
-            neglected_work[strain < SINGLE_PRECISION**2 * rotated] = 0.0  # stresses of a rigid-body motion are round-off
+            neglected_work[strain < SINGLE_PRECISION**2 * rotated] = 0.0  # stresses of rigid-body motions are round-off
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
             np.add.at(work_by_body, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
     return neglected, work_by_body
