@@ -143,7 +143,7 @@ def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
 
     A chunk contains a small field at several steps, because the chunk index would otherwise be larger than the fields. Only
     chunks of a single step are compressed, because a compressed chunk moves in the file when data are added to it, and only
-    those of `layout.SPARSE_FIELDS`. Other fields would shrink by a third, in half the time of writing a file.
+    those of `layout.SPARSE_FIELDS`. Other fields would shrink by 30 %, in up to half of the time of writing a file.
     """
     tail, rows = () if width == 1 else (width,), max(length, 1)
     steps = MAX_SHARED // (8 * rows * width)

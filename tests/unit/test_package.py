@@ -6,6 +6,8 @@ import tomllib
 
 import pytest
 
+from fastcontact._tools.records import field, record, replace
+
 
 @pytest.fixture
 def project(root):
@@ -46,3 +48,15 @@ def test_figures_beside_others_are_those_of_the_benchmarks(root):
     assert len(figures) >= 6
     for figure in figures:
         assert re.search(rf"(?<![\d.]){re.escape(figure)}(?![\d.])", measured), figure
+
+
+def test_a_record_is_compared_by_identity_and_changed_by_replace():
+    @record
+    class Pair:
+        gap: float
+        forces: list[float] = field(default_factory=list)
+
+    pair = Pair(1.0)
+    assert (pair.gap, pair.forces, replace(pair, gap=2.0).gap) == (1.0, [], 2.0)
+    assert pair != Pair(1.0)
+    assert len({pair, pair}) == 1
