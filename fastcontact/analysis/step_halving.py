@@ -22,7 +22,6 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.wear_iteration import newton_with_wear
 from fastcontact.arrays import largest
 from fastcontact.errors import ConvergenceError
-from fastcontact.model.checks import facet_lengths
 from fastcontact.results.step import StepResult
 
 log = logging.getLogger("fastcontact")
@@ -137,7 +136,7 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
     turns = {name: abs(angle - state.angles.get(name, 0.0)) for name, angle in after.angles.items() if name in pairs}
     arcs = [turn * float(np.linalg.norm(np.ptp(pairs[name].points, axis=0))) for name, turn in turns.items()]
     motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *arcs)
-    if motion < min(float(facet_lengths(pair).min()) for pair in pairs.values()):
+    if motion < min(float(pair.secondary.largest_diameters(pair.points).min()) for pair in pairs.values()):
         return False
     load = problem.load_at(after.instant)
     problem.solver.put_back(state.solver)

@@ -198,6 +198,8 @@ def symmetry_planes(
     held, driven = motions.projectors_at(surface.points), motions.driven[surface.points]
     partly_held = np.trace(held, axis1=1, axis2=2) < points.shape[1] - 0.5
     tolerance, planes = PLANE_TOLERANCE * float(np.ptp(points, axis=0).max()), []
+    # Facets may be short compared with the surface: nodes next to the plane do not belong to it.
+    within = np.minimum(tolerance, 0.25 * surface.largest_diameters(coordinates))
     normals = nodal_normals(surface, coordinates)
     for axis in _held_directions(held[partly_held]):
         x, x_opposite = points @ axis, opposite @ axis
@@ -205,7 +207,7 @@ def symmetry_planes(
         for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):
             if np.ptp(x) <= tolerance or (outward * (x_opposite - end) > tolerance).any():
                 continue
-            nodes = np.flatnonzero(partly_held & (np.abs(x - end) <= tolerance))
+            nodes = np.flatnonzero(partly_held & (np.abs(x - end) <= within))
             on_plane = np.einsum("d,nde,e->n", axis, held[nodes], axis) >= SAME_DIRECTION**2
             on_plane &= ~driven[nodes][:, components].any(axis=1)
             # Otherwise the plane does not cut the surface.

@@ -5,16 +5,26 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
-from fastcontact.arrays import Array, Numbers
+from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.linear.sparse_rows import assembled
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Areas below this fraction of a reference area, such as the largest nodal area, count as zero, because pressures on them
-# would be nearly arbitrary.
+# Areas below this fraction of a reference area count as zero, because pressures on them would be nearly arbitrary.
 NEGLIGIBLE_AREA = 1e-3
+
+
+def nodes_with_area(areas: AnyArray, *facet_nodes: Indices) -> Mask:
+    """Return the nodes (n,) whose `areas` (n,) are not negligible relative to the largest one on their facets [area].
+
+    `facet_nodes` are arrays (n_facets, n_nodes) with the nodes of facets of one element type each.
+    """
+    largest = np.zeros(len(areas))
+    for nodes in facet_nodes:
+        np.maximum.at(largest, nodes, np.abs(areas)[nodes].max(axis=1, keepdims=True))
+    return areas > NEGLIGIBLE_AREA * largest
 
 
 def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:

@@ -193,6 +193,13 @@ class Surface:
         adjacency.sort_indices()
         return adjacency.indptr.astype(np.intp), adjacency.indices.astype(np.intp)
 
+    def largest_diameters(self, coordinates: Array) -> Array:
+        """Return the diameter of the largest facet at each node (m,) [length]; see `FacetBlock.diameters`."""
+        largest = np.zeros(len(self.points))
+        for block in self.blocks:
+            np.maximum.at(largest, block.local, block.diameters(coordinates)[:, None])
+        return largest
+
     def node_positions(self, coordinates: Array) -> list[Array]:
         """Return the positions (n_facets, n_nodes, dim) of the nodes of the facets of each block [length].
 

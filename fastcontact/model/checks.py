@@ -92,7 +92,7 @@ def check_penetration(name: str, pair: Formulation) -> None:
     An intended interference is smaller than this, or is specified by the option `clearance`.
     """
     gap, _ = initial_gaps(pair)
-    size = facet_lengths(pair)
+    size = pair.secondary.largest_diameters(pair.points)
     row = int(np.argmin(gap / size))
     if gap[row] < -size[row]:
         point = pair.secondary.points[row]
@@ -101,14 +101,6 @@ def check_penetration(name: str, pair: Formulation) -> None:
             f"the length of the element there ({size[row]:.4g}): separate the bodies, reverse the orientation of a surface, "
             "or specify an intended interference as a clearance"
         )
-
-
-def facet_lengths(pair: Formulation) -> Array:
-    """Return the diameter of the largest facet at each secondary node (n_nodes,) [length]."""
-    longest = np.zeros(len(pair.secondary.points))
-    for block in pair.secondary.blocks:
-        np.maximum.at(longest, block.local, block.diameters(pair.points)[:, None])
-    return longest
 
 
 def initial_gaps(pair: Formulation) -> tuple[Array, Array]:

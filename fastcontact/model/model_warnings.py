@@ -22,7 +22,7 @@ from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
 from fastcontact.mesh.topology import cached_by_mesh, outer_facets
-from fastcontact.model.checks import facet_lengths, initial_gaps
+from fastcontact.model.checks import initial_gaps
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Pairs, Supports, prescribed_overlap_warnings
 from fastcontact.model.ramp import Harmonic, Ramp, Table
@@ -219,7 +219,9 @@ def _penetration(model: Model, pairs: Pairs, prescribed: Array) -> Iterator[str]
             continue  # the penetration is an interference, which loads the bodies
         gap, normal = initial_gaps(bound)
         approach = np.abs(normal) @ motion
-        approach = np.where(approach > SINGLE_PRECISION * motion.max(), approach, SAG * facet_lengths(bound))
+        approach = np.where(
+            approach > SINGLE_PRECISION * motion.max(), approach, SAG * bound.secondary.largest_diameters(bound.points)
+        )
         row = int(np.argmin(gap + approach))
         if -gap[row] > approach[row]:
             point = bound.secondary.points[row]

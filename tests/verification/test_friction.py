@@ -119,3 +119,24 @@ def test_corner_nodes_of_walls_with_friction_settle(element, mu, formulation, nu
             np.abs(contact.force_vectors[:, normal]).sum(),
         )
         assert along <= mu * across * (1 + 1e-3)
+
+
+def test_points_that_do_not_touch_are_not_part_of_the_dense_system():
+    """Two cylinders on a strip of 1600 facets: all of its points would exceed the limit of constraints with friction."""
+
+    def rolled(mesh, group):
+        model = elastic_model(mesh, BOTTOM="xy")
+        for name, x in (("left", 100.0), ("right", 300.0)):
+            roller = fc.obstacles.Sphere((x, 6.0), 5.0)
+            motion = {"x": 0.01, "y": -0.02}
+            model.add_obstacle(
+                name, secondary=group, obstacle=roller, motion=motion, friction=0.3, formulation="continuous"
+            )
+        return fc.solve(model, 2)[-1].contact
+
+    mesh = fc.generate.block((400.0, 1.0), (1600, 4))
+    near = mesh.with_facet_group("NEAR", lambda x: (x[:, 1] > 0.999) & (np.abs(np.abs(x[:, 0] - 200.0) - 100.0) < 3.0))
+    whole, part = rolled(mesh, "TOP"), rolled(near, "NEAR")
+    for name, contact in part.items():
+        assert contact.force[1] < 0.0
+        assert np.abs(whole[name].force - contact.force).max() < 1e-9 * np.abs(contact.force).max()
