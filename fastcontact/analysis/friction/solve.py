@@ -48,7 +48,7 @@ def solve(
 
     Each constraint in F costs columns of the inverse stiffness matrix. The problem therefore begins with the constraints that
     were closed, and adds others if they penetrate. Constraints that are never added are open and free of forces, so that the
-    result is that of the complete problem. If a compliance couples constraints, all of them are included from the start.
+    result is that of the complete problem.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def solve(
         log.info("friction: the iteration on eliminated constraints did not converge, their compliance is formed")
     usable = constraints.usable
     initial = closed | constraints.equality if path is None else closed | constraints.equality | ~path.waiting
-    included = usable if coupled else usable & initial
+    included = usable & initial
     iterations = 0
     while True:
         solution = _with_included(included, loaded, constraints, closed, u, forces, path)
@@ -210,7 +210,15 @@ def _with_included(
     u = loaded.involved_solution(R.T @ y.ravel()[components], u)
     all_forces = np.zeros((1 + k, m))
     gaps = gaps_at_rest + (all_rows @ u).reshape(1 + k, m)
-    all_forces[:, rows], gaps[:, rows] = y, gaps_of_included
+    all_forces[:, rows] = y
+    if constraints.compliance is not None:
+        axes = np.stack(constraints.coupled_directions or constraints.directions)
+        frame = np.concatenate([normals(list(axes))[None], axes])
+        vectors = constraints.compliance.apply(np.einsum("km,kmd->md", all_forces, frame))
+        gaps += np.einsum("md,kmd->km", vectors, frame)
+    Z = constraints.low_rank_compliance
+    gaps += Z @ np.einsum("kmh,km->h", Z, all_forces)
+    gaps[:, rows] = gaps_of_included
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
 
