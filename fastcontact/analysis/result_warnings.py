@@ -33,7 +33,7 @@ from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Largest recommended factor by which to increase the number of steps. A larger factor indicates a wrong coefficient of wear.
+# Factor by which load steps are too large for the wear of single facets, above which the coefficient of wear may be wrong.
 LARGEST_STEP_FACTOR = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `pressure_oscillation`. On other
 # facets the limit is ALTERNATING.

@@ -13,10 +13,13 @@ import numpy as np
 from fastcontact._jit.decorators import kernel
 from fastcontact.elasticity.constitutive_kernels import (
     INVARIANTS,
+    PLASTIC,
+    add_volumetric,
     cofactor,
     determinant,
     evaluate_law,
     first_invariant,
+    plastic,
     sum_products,
     voigt,
 )
@@ -205,16 +208,16 @@ def _evaluate_point(
 
 
 @kernel
-def _subtract_elastic(constants, D, bulk, plane_stress, A):
-    """Subtract the elastic tangent of small strains, without the projected dilatation, from A (18, 12)."""
-    no_history, new, P, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.zeros((18, 12))
+def _elastic_tangent(constants, D, bulk, plane_stress):
+    """Return A (24, 12) for elastic small strains, without the projected dilatation."""
+    no_history, new, P, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.zeros((24, 12))
     F, G = np.zeros((3, 3)), np.empty((3, 3))
     finite, tangent, geometric = np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
     dilatation = _dilatation(F, finite, G)
     _evaluate_point(
         constants, D, bulk, 0.0, 0.0, plane_stress, finite, geometric, tangent, F, dilatation, G, no_history, new, P, elastic
     )  # fmt: skip
-    A -= elastic
+    return elastic
 
 
 @kernel
@@ -396,14 +399,14 @@ def linearise(
     gradient, volume, forces = np.empty((3 * n_q + 1, width)), np.empty(n_q), np.empty((4, width))
     F, G, Fs, Gs = np.empty((3, 3)), np.empty((3, 3)), np.empty((3 * n_q, 3)), np.empty((3 * n_q, 3))
     dilatation, strain_z, pressure = np.empty(n_q), np.zeros(n_q), np.empty(n_q)
-    P, A, in_part = np.empty((3, 3)), np.zeros((18, 12)), np.empty(n_nodes, np.bool_)
-    before, after, factors = np.zeros(9), np.empty(9), np.zeros((3 * n_q, 4))
+    P, A, in_part = np.empty((3, 3)), np.zeros((24, 12)), np.empty(n_nodes, np.bool_)
+    before, after, factors = np.zeros(9), np.zeros(9), np.zeros((3 * n_q, 4))
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     local = np.empty((n_pairs * width, width))
     mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if full_tangent else 0, width))
     # Numba counts array references by atomic operations where views are created, and in functions that call others in
     # branches. This would take as long as the law of the first invariant itself. Therefore, the law is called directly here.
-    row, law, D, direct = -1, constants[0], moduli[0], False
+    row, law, D, direct, yields, elastic_tangent = -1, constants[0], moduli[0], False, False, A
     for c in range(n_cells):
         if not find_owned(cells, c, owner, part, in_part):
             continue
@@ -431,6 +434,9 @@ def linearise(
                 row = material[c, q]
                 law, D = constants[row], moduli[row]
                 direct = finite and geometric == 2 and not plane_stress and law[0] == INVARIANTS and law[4] == 0.0
+                yields = law[0] == PLASTIC and not plane_stress
+                if tangent and elastic and law[0] == PLASTIC:
+                    elastic_tangent = _elastic_tangent(law, D, bulk[row, 1], plane_stress)
             for e in range(9 if len(new) else 0):
                 before[e] = old[c, q, e]
             _copy(Fs, 3 * q, F, 0)
@@ -441,6 +447,12 @@ def linearise(
                 density, factor, d2J_factor, _, _ = first_invariant(law, F, J, G, volumetric, full_tangent, P, A)
                 sum_products(2, factor, d2J_factor, full_tangent, F, A)
                 density += 0.5 * bulk[row, 1] * dilatation[q] ** 2
+            elif yields:
+                density = plastic(law, F, full_tangent, before, after, P, A)
+                volumetric = pressure[q] + bulk[row, 1] * dilatation[q], bulk[row, 1], 0.0
+                add_volumetric(F, G, volumetric, full_tangent or after[6] > before[6], P, A)
+                density += 0.5 * bulk[row, 1] * dilatation[q] ** 2
+                dissipated += volume[q] * after[7]
             else:
                 density, converged = _evaluate_point(
                     law, D, bulk[row, 1], pressure[q], strain_z[q], plane_stress, finite, geometric, full_tangent, F,
@@ -452,8 +464,9 @@ def linearise(
             stored += volume[q] * density
             _weigh(P, 0, volume[q], dim, factors, 3 * q)
             flows = not direct and after[6] > before[6]
-            if tangent and elastic and flows:
-                _subtract_elastic(law, D, bulk[row, 1], plane_stress, A)
+            for e in range(9 if tangent and elastic and flows else 0):
+                for k in range(9):
+                    A[e, k] -= elastic_tangent[e, k]
             if tangent and (flows or not elastic):
                 _store_tangent(gradient, q, volume[q], A, dim, n_factors, left, right)
                 n_factors += 3

@@ -2,7 +2,7 @@
 """Constitutive laws at one quadrature point: first Piola-Kirchhoff stress, its derivative, and the history.
 
 Shared arguments: ``F`` (3, 3) is the deformation gradient [-] and ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure].
-The first nine rows and columns of ``A`` (18, 12) contain its derivative dP/dF, in which component iJ has the index 3 i + J;
+The first nine rows and columns of ``A`` (24, 12) contain its derivative dP/dF, in which component iJ has the index 3 i + J;
 the other entries are work space. For laws at small strains, F is the displacement gradient and P the Cauchy stress.
 `constants` (n_constants,) begin with the number of the law, see `nonlinear_materials`. `old` and `new` (9,) are the history
 variables at the beginning and the end of the load step: the plastic strain (xx, yy, zz, xy, yz, xz, tensor
@@ -18,14 +18,12 @@ from fastcontact._jit.decorators import innermost_kernel, kernel
 from fastcontact.elasticity.tile_product import tile
 
 LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN, LOGARITHMIC = range(6)
-# First rows of the two groups of rows of A that `first_invariant` uses as work space.
-LEFT, RIGHT = 12, 15
+# First rows of the two groups of six rows of A that serve as work space, see `_multiply`.
+LEFT, RIGHT = 12, 18
 # Relative excess of the trial stress over the yield stress that is considered round-off.
 YIELD_TOLERANCE = 1e-12
 # Relative difference of squared stretches below which the tangent treats them as equal.
 EQUAL_STRETCHES = 1e-7
-# Relative difference of squared stretches below which second divided differences are computed by a series.
-SERIES_LIMIT = 1e-3
 
 
 @kernel
@@ -63,16 +61,18 @@ def _add_second_derivative(F, factor, A):
 
 
 @kernel
-def _add_volumetric(F, G, volumetric, tangent, P, A):
+def add_volumetric(F, G, volumetric, tangent, P, A):
     """Add the `volumetric` terms to P and, if `tangent` is true, to A; see `evaluate_law`."""
     pressure, bulk, d2J_factor = volumetric
     for i in range(3):
         for j in range(3):
             P[i, j] += pressure * G[i, j]
-    for row in range(9 if tangent else 0):  # reshaping G would take longer than the loops
-        factor = bulk * G[row // 3, row % 3]
-        for column in range(9):
-            A[row, column] += factor * G[column // 3, column % 3]
+    for row in range(3 if tangent else 0):
+        for i in range(3):
+            factor = bulk * G[row, i]
+            for column in range(3):
+                for j in range(3):
+                    A[3 * row + i, 3 * column + j] += factor * G[column, j]
     _add_second_derivative(F, d2J_factor, A)
 
 
@@ -84,7 +84,7 @@ def right_cauchy_green(F, C):
             C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
 
 
-@kernel
+@innermost_kernel
 def voigt(i, j):
     """Return the number of component (i, j) in the order xx, yy, zz, xy, yz, xz."""
     if i == j:
@@ -119,66 +119,82 @@ def _linear(D, F, tangent, P, A):
     return _hooke(D, strain, P)
 
 
-@kernel
+@innermost_kernel
 def _yield_stress(constants, p):
     """Return the yield stress, its slope at the equivalent plastic strain p, and the end of this segment of the table."""
     n = int(constants[4])
-    for k in range(n - 1):
+    limit, slope, end = constants[4 + 2 * n], 0.0, np.inf
+    for k in range(n - 2, -1, -1):
         p0, s0, p1, s1 = constants[5 + 2 * k], constants[6 + 2 * k], constants[7 + 2 * k], constants[8 + 2 * k]
         if p < p1:
-            slope = (s1 - s0) / (p1 - p0)
-            return s0 + slope * (p - p0), slope, p1
-    return constants[4 + 2 * n], 0.0, np.inf
+            slope, end = (s1 - s0) / (p1 - p0), p1
+            limit = s0 + slope * (p - p0)
+    return limit, slope, end
 
 
-@kernel
-def _plastic(constants, F, tangent, old, new, P, A):
-    """Apply von Mises plasticity by radial return (Simo and Hughes, 1998, boxes 3.1, 3.2); return the elastic energy.
+@innermost_kernel
+def _multiply(n, tangent, A):
+    """Fill A with the sum of n dyadic products of its rows LEFT + k and RIGHT + k, if `tangent` is true."""
+    for row in range(0, 12 if tangent else 0, 4):
+        for column in range(0, 12, 4):
+            tile(A, LEFT, row, A, RIGHT, column, n, A, row, True)
 
-    P, A and the energy are the deviatoric parts. Isotropic hardening is tabulated. Kinematic hardening is linear (Prager),
-    with the modulus H.
+
+@innermost_kernel
+def _radial_return(constants, trial, old):
+    """Compute the radial return from the von Mises stress `trial` (Simo and Hughes, 1998, boxes 3.1 and 3.2).
+
+    The results are the equivalent plastic strain, the plastic work without that of kinematic hardening, the ratio of the
+    increment of plastic strain to the relative trial stress xi, and two coefficients of the moduli: twice the shear modulus
+    and the factor of ``-xi xi``.
     """
-    mu, H, xi = constants[1], constants[3], np.empty(9)
-    mean, square = (F[0, 0] + F[1, 1] + F[2, 2]) / 3.0, 0.0
-    for i in range(3):
-        for j in range(3):
-            strain = 0.5 * (F[i, j] + F[j, i]) - (mean if i == j else 0.0)
-            xi[3 * i + j] = 2.0 * mu * strain - (2.0 * mu + 2.0 / 3.0 * H) * old[voigt(i, j)]
-            square += xi[3 * i + j] ** 2
-    trial = np.sqrt(1.5 * square)
-    p, work, equivalent = old[6], old[7], trial
+    mu, H, p, work, equivalent, returned = constants[1], constants[3], old[6], old[7], trial, False
     limit, slope, end = _yield_stress(constants, p)
-    while equivalent > limit * (1.0 + YIELD_TOLERANCE):
+    while not returned and equivalent > limit * (1.0 + YIELD_TOLERANCE):
         step = min((equivalent - limit) / (3.0 * mu + H + slope), end - p)
         equivalent -= (3.0 * mu + H) * step
         work += (limit + 0.5 * slope * step) * step
         p += step
-        if p < end:
-            break
+        returned = p < end
         limit, slope, end = _yield_stress(constants, p)
-    increment = p - old[6]
-    flow = 1.5 * increment / trial if increment > 0.0 else 0.0
-    new[6] = p
+    increment, flow, rank_one = p - old[6], 0.0, 0.0
+    if increment > 0.0:
+        flow = 1.5 * increment / trial
+        rank_one = 9.0 * mu * mu / trial**2 * (1.0 / (3.0 * mu + H + slope) - increment / trial)
+    return p, work, flow, 2.0 * mu * (1.0 - 2.0 * mu * flow), rank_one
+
+
+@innermost_kernel
+def plastic(constants, F, tangent, old, new, P, A):
+    """Apply von Mises plasticity by radial return; return the elastic energy.
+
+    P, A and the energy are the deviatoric parts. Isotropic hardening is tabulated. Kinematic hardening is linear (Prager),
+    with the modulus H. The relative trial stress xi is stored in the work space of A.
+    """
+    mu, H = constants[1], constants[3]
+    mean, square = (F[0, 0] + F[1, 1] + F[2, 2]) / 3.0, 0.0
+    for i in range(3):
+        for j in range(3):
+            strain = 0.5 * (F[i, j] + F[j, i]) - (mean if i == j else 0.0)
+            P[i, j] = 2.0 * mu * strain
+            xi = 2.0 * mu * strain - (2.0 * mu + 2.0 / 3.0 * H) * old[voigt(i, j)]
+            A[RIGHT, 3 * i + j] = xi
+            square += xi**2
+    p, work, flow, shear, rank_one = _radial_return(constants, np.sqrt(1.5 * square), old)
     old_square = new_square = energy = 0.0
     for i in range(3):
         for j in range(3):
-            c = voigt(i, j)
+            c, xi = voigt(i, j), A[RIGHT, 3 * i + j]
+            A[LEFT, 3 * i + j] = -rank_one * xi
             old_square += old[c] ** 2
-            new[c] = old[c] + flow * xi[3 * i + j]
+            new[c] = old[c] + flow * xi
             new_square += new[c] ** 2
-            P[i, j] = 2.0 * mu * (0.5 * (F[i, j] + F[j, i]) - (mean if i == j else 0.0) - new[c])
+            P[i, j] -= 2.0 * mu * new[c]
             energy += P[i, j] * P[i, j] / (4.0 * mu)
-    new[7] = work + H / 3.0 * (new_square - old_square)
-    if not (tangent or increment > 0.0):
-        return energy
-    shear = 2.0 * mu * (1.0 - 2.0 * mu * flow)
-    rank_one = 0.0
-    if increment > 0.0:
-        rank_one = 9.0 * mu * mu / trial**2 * (1.0 / (3.0 * mu + H + slope) - increment / trial)
-    for row in range(9):
-        for column in range(9):
-            A[row, column] = -rank_one * xi[row] * xi[column]
-    for i in range(3):
+    new[6], new[7] = p, work + H / 3.0 * (new_square - old_square)
+    tangent |= p > old[6]
+    _multiply(1, tangent, A)
+    for i in range(3 if tangent else 0):
         for j in range(3):
             A[3 * i + j, 3 * i + j] += 0.5 * shear
             A[3 * i + j, 3 * j + i] += 0.5 * shear
@@ -187,48 +203,70 @@ def _plastic(constants, F, tangent, old, new, P, A):
 
 
 @kernel
-def _first_piola_kirchhoff(F, S, P):
-    """Fill P with ``F S``, where S (3, 3) is the second Piola-Kirchhoff stress."""
+def _diagonalise(C, axes):
+    """Diagonalise the symmetric matrix C (3, 3) by Jacobi rotations, and fill the columns of `axes` with its eigenvectors.
+
+    `axes` has the shape (3, 3). Only the upper triangle of C is used (Golub and Van Loan, 2013, section 8.5).
+    """
     for i in range(3):
         for j in range(3):
-            P[i, j] = F[i, 0] * S[0, j] + F[i, 1] * S[1, j] + F[i, 2] * S[2, j]
+            axes[i, j] = 1.0 if i == j else 0.0
+    trace = C[0, 0] + C[1, 1] + C[2, 2]
+    while trace + (abs(C[0, 1]) + abs(C[0, 2]) + abs(C[1, 2])) > trace:
+        for k in range(2, -1, -1):
+            p, q = (1 if k == 0 else 0), (1 if k == 2 else 2)
+            if C[p, q] == 0.0:
+                continue
+            cotangent = 0.5 * (C[q, q] - C[p, p]) / C[p, q]  # of twice the angle of rotation
+            t = np.copysign(1.0, cotangent) / (abs(cotangent) + np.sqrt(cotangent * cotangent + 1.0))
+            c = 1.0 / np.sqrt(t * t + 1.0)
+            s, change = t * c, t * C[p, q]
+            C[p, p] -= change
+            C[q, q] += change
+            C[p, q] = 0.0
+            low, high = (min(k, p), max(k, p)), (min(k, q), max(k, q))
+            C[low], C[high] = c * C[low] - s * C[high], s * C[low] + c * C[high]
+            for i in range(3):
+                axes[i, p], axes[i, q] = c * axes[i, p] - s * axes[i, q], s * axes[i, p] + c * axes[i, q]
 
 
 @kernel
-def _push_forward(F, S, C, A):
-    """Fill A, given the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) for Green-Lagrange strains."""
-    pushed = np.empty((9, 9))
+def _from_principal_axes(F, axes, C, beta, gamma, shear, tangent, P, A):
+    """Fill P and A, given stresses and moduli in the principal axes of the diagonalised right Cauchy-Green tensor C (3, 3).
+
+    The columns of `axes` (3, 3) are the principal axes or, for elastic strains, their products with the factor L. `beta` (3,)
+    contains the Kirchhoff stresses, and `gamma` (3, 3) their derivatives with respect to the logarithmic strains. In the
+    plane normal to axis a, ``shear[a]`` is the ratio of shear components of the second Piola-Kirchhoff stress to those of C
+    (Simo and Taylor, 1991, equation 2.28).
+    """
+    deformed = np.empty((3, 3))
+    for i in range(3):
+        for a in range(3):
+            deformed[i, a] = F[i, 0] * axes[0, a] + F[i, 1] * axes[1, a] + F[i, 2] * axes[2, a]
     for i in range(3):
         for j in range(3):
-            for column in range(9):
-                value = 0.0
-                for k in range(3):
-                    value += F[i, k] * C[3 * k + j, column]
-                pushed[3 * i + j, column] = value
-    for row in range(9):
-        for k in range(3):
-            for m in range(3):
-                value = S[row % 3, m] if row // 3 == k else 0.0
-                for n in range(3):
-                    value += pushed[row, 3 * n + m] * F[k, n]
-                A[row, 3 * k + m] = value
-
-
-@kernel
-def _first_difference(x, y):
-    """Return the divided difference of ln(x) / 2 at x and y."""
-    difference = (x - y) / y
-    return 0.5 / x if difference == 0.0 else 0.5 * np.log1p(difference) / (x - y)
-
-
-@kernel
-def _second_difference(x, y, z):
-    """Return the second divided difference of ln(x) / 2 at x <= y <= z."""
-    if z - x > SERIES_LIMIT * z:
-        return (_first_difference(y, z) - _first_difference(x, y)) / (z - x)
-    mean = (x + y + z) / 3.0
-    a, b, c = x / mean - 1.0, y / mean - 1.0, z / mean - 1.0
-    return ((a**3 + b**3 + c**3) / 15.0 - (a * a + b * b + c * c) / 8.0 - 0.5) * 0.5 / mean**2
+            P[i, j] = 0.0
+            for a in range(3):
+                b, c = (a + 1) % 3, (a + 2) % 3
+                A[LEFT + a, 3 * i + j] = deformed[i, a] * axes[j, a]
+                A[LEFT + 3 + a, 3 * i + j] = deformed[i, b] * axes[j, c] + deformed[i, c] * axes[j, b]
+                P[i, j] += beta[a] / C[a, a] * A[LEFT + a, 3 * i + j]
+    for a in range(3 if tangent else 0):
+        for e in range(9):
+            A[RIGHT + a, e] = -2.0 * beta[a] / C[a, a] ** 2 * A[LEFT + a, e]
+            A[RIGHT + 3 + a, e] = shear[a] * A[LEFT + 3 + a, e]
+        for b in range(3):
+            modulus = gamma[a, b] / (C[a, a] * C[b, b])
+            for e in range(9):
+                A[RIGHT + a, e] += modulus * A[LEFT + b, e]
+    _multiply(6, tangent, A)
+    for j in range(3 if tangent else 0):
+        for m in range(3):
+            S = 0.0
+            for a in range(3):
+                S += beta[a] / C[a, a] * axes[j, a] * axes[m, a]
+            for i in range(3):
+                A[3 * i + j, 3 * i + m] += S
 
 
 @kernel
@@ -236,94 +274,94 @@ def _logarithmic(constants, F, tangent, old, new, P, A):
     """Apply plasticity with logarithmic elastic strains (Eterovic and Bathe, 1990; Simo, 1992); return the elastic energy.
 
     With the factor L of the plastic deformation at the beginning of the load step, the trial elastic strain is ln(C) / 2,
-    where C = (F L)^T F L. `_plastic` relates it to its conjugate stress T. The plastic flow is integrated by the exponential
-    map in the principal axes of C. Derivatives of the strain in principal axes are divided differences of the logarithm
-    (Daleckii and Krein).
+    where C = (F L)^T F L. The return to the yield surface and the exponential map, which integrates the plastic flow, leave
+    the principal axes of C unchanged.
     """
-    C, T, D, L = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.eye(3)
+    C, axes, L_axes, gamma = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    beta, shear, mu, square, energy = np.empty(3), np.empty(3), constants[1], 0.0, 0.0
     for i in range(3):
-        for j in range(i + 1):
-            L[i, j] += old[voigt(i, j)]
-    right_cauchy_green(F @ L, C)
-    squared, axes = np.linalg.eigh(C)
-    without_strain = old.copy()
-    without_strain[:6] = 0.0
-    with_moduli = np.bool_(True)  # for a literal, Numba would compile the law again
-    energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, with_moduli, without_strain, new, T, D)
-    slope, L_axes = np.empty((3, 3)), L @ axes
-    _flow(L_axes, axes, old, new)
+        for j in range(3):
+            L_axes[i, j] = F[i, j]
+            for k in range(j, 3):
+                L_axes[i, j] += F[i, k] * old[voigt(k, j)]
+    right_cauchy_green(L_axes, C)
+    _diagonalise(C, axes)
+    for a in range(3):
+        beta[a] = mu * np.log(C[a, a])
+    mean = (beta[0] + beta[1] + beta[2]) / 3.0
+    for a in range(3):
+        beta[a] -= mean
+        square += beta[a] ** 2
+        for i in range(3):
+            L_axes[i, a] = axes[i, a]
+            for k in range(i + 1):
+                L_axes[i, a] += old[voigt(i, k)] * axes[k, a]
+    new[6], new[7], flow, modulus, rank_one = _radial_return(constants, np.sqrt(1.5 * square), old)
+    if flow > 0.0:
+        _flow(L_axes, beta, flow, axes, gamma, new)
     for a in range(3):
         for b in range(3):
-            slope[a, b] = 2.0 * _first_difference(squared[a], squared[b])
-    transformation, T, factor = _congruence(axes), axes.T @ T @ axes, slope.reshape(9)
-    S = L_axes @ (slope * T) @ L_axes.T
-    _first_piola_kirchhoff(F, S, P)
-    if not tangent:
-        return energy
-    moduli = transformation.T @ D @ transformation * factor
-    moduli *= factor.reshape(9, 1)
+            gamma[a, b] = (modulus if a == b else 0.0) - modulus / 3.0 - rank_one * beta[a] * beta[b]
     for a in range(3):
-        for b in range(3):
-            for c in range(3):
-                low, high = min(a, b, c), max(a, b, c)
-                value = T[a, c] * _second_difference(squared[low], squared[a + b + c - low - high], squared[high])
-                for row in (3 * a + b, 3 * b + a):
-                    for column in (3 * b + c, 3 * c + b):
-                        moduli[row, column] += value
-                        moduli[column, row] += value
-    transformation = _congruence(L_axes)
-    _push_forward(F, S, transformation @ moduli @ transformation.T, A)
+        beta[a] *= 1.0 - 2.0 * mu * flow
+        energy += beta[a] ** 2 / (4.0 * mu)
+    for a in range(3):  # differences of stresses are formed from those of strains, without cancellation
+        x, y = C[(a + 1) % 3, (a + 1) % 3], C[(a + 2) % 3, (a + 2) % 3]
+        difference = (x - y) / y
+        ratio = np.log1p(difference) / difference if difference != 0.0 else 1.0
+        shear[a] = (0.5 * modulus * ratio - beta[(a + 2) % 3]) / (x * y)
+    _from_principal_axes(F, L_axes, C, beta, gamma, shear, tangent, P, A)
     return energy
 
 
 @kernel
-def _congruence(axes):
-    """Return the matrix (9, 9) that maps the 9 components of a tensor M to those of Q M Q^T, with `axes` (3, 3) as Q."""
-    transformation = np.empty((9, 9))
-    for row in range(9):
-        for column in range(9):
-            transformation[row, column] = axes[row // 3, column // 3] * axes[row % 3, column % 3]
-    return transformation
+def _flow(L_axes, xi, flow, scaled, L, new):
+    """Replace the plastic strain in `new` by L - I at the end of the load step; see the module docstring.
 
-
-@kernel
-def _flow(L_axes, axes, old, new):
-    """Replace the increment of plastic strain in `new` by L - I at the end of the load step; see the module docstring.
-
-    The columns of `axes` (3, 3) are the principal axes of the increment, and `L_axes` (3, 3) is the factor before the load
-    step times `axes`.
+    The columns of `L_axes` (3, 3) are the principal axes of the increment, multiplied by L at the beginning of the step. The
+    increments along these axes are `flow` times `xi` (3,). `scaled` and L (3, 3) are overwritten.
     """
-    if new[6] > old[6]:
-        increment = np.empty((3, 3))
+    for a in range(3):
+        factor = np.exp(-flow * xi[a])
         for i in range(3):
-            for j in range(3):
-                increment[i, j] = new[voigt(i, j)]
-        metric = (L_axes * np.exp(-2.0 * np.diag(axes.T @ increment @ axes))) @ L_axes.T
-        factor = np.linalg.cholesky(metric)
-        for i in range(3):
-            for j in range(i + 1):
-                new[voigt(i, j)] = factor[i, j] - (1.0 if i == j else 0.0)
-    else:
-        for k in range(6):  # assigning to a slice would also compile its error message, which takes seconds
-            new[k] = old[k]
+            scaled[i, a] = factor * L_axes[i, a]
+    for i in range(3):
+        for j in range(i + 1):
+            value = 0.0
+            for a in range(3):
+                value += scaled[i, a] * scaled[j, a]
+            for k in range(j):
+                value -= L[i, k] * L[j, k]
+            L[i, j] = np.sqrt(value) if i == j else value / L[j, j]
+            new[voigt(i, j)] = L[i, j] - (1.0 if i == j else 0.0)
 
 
 @kernel
 def _saint_venant(D, F, tangent, P, A):
     """Apply Hooke's law to Green-Lagrange strain and second Piola-Kirchhoff stress; return the energy density."""
-    strain, S, C = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
+    strain, S = np.empty((3, 3)), np.empty((3, 3))
     right_cauchy_green(F, strain)
     strain *= 0.5
     for i in range(3):
         strain[i, i] -= 0.5
     energy = _hooke(D, strain, S)
-    _first_piola_kirchhoff(F, S, P)
-    if not tangent:
-        return energy
-    for row in range(9):
-        for column in range(9):
-            C[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]
-    _push_forward(F, S, C, A)
+    for v in range(6):  # derivatives of the engineering strains
+        m, n = (v, v) if v < 3 else (1 - v % 2, 1 + v // 4)
+        for i in range(3):
+            for j in range(3):
+                A[LEFT + v, 3 * i + j] = F[i, n] if j == m else (F[i, m] if j == n else 0.0)
+    for e in range(9):
+        i, j = e // 3, e % 3
+        P[i, j] = F[i, 0] * S[0, j] + F[i, 1] * S[1, j] + F[i, 2] * S[2, j]
+        for v in range(6 if tangent else 0):
+            A[RIGHT + v, e] = 0.0
+            for w in range(6):
+                A[RIGHT + v, e] += D[v, w] * A[LEFT + w, e]
+    _multiply(6, tangent, A)
+    for i in range(3 if tangent else 0):
+        for j in range(3):
+            for m in range(3):
+                A[3 * i + j, 3 * i + m] += S[j, m]
     return energy
 
 
@@ -382,9 +420,7 @@ def sum_products(n, factor, d2J_factor, tangent, F, A):
 
     For the work space and the factors, see `first_invariant`.
     """
-    for row in range(0, 12 if tangent else 0, 4):
-        for column in range(0, 12, 4):
-            tile(A, LEFT, row, A, RIGHT, column, n, A, row, True)
+    _multiply(n, tangent, A)
     for row in range(9 if tangent else 0):
         A[row, row] += factor
     _add_second_derivative(F, d2J_factor if tangent else 0.0, A)
@@ -434,16 +470,15 @@ def _ogden(constants, F, tangent, P, A):
     are those of Simo and Taylor (1991, equation 2.28).
     """
     n = int(constants[3])
-    C = np.empty((3, 3))
+    C, axes, gamma = np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 3))
+    beta, shear, powers, energy = np.zeros(3), np.empty(3), np.empty(3), 0.0
     right_cauchy_green(F, C)
-    squared, axes = np.linalg.eigh(C)
-    scale = (squared[0] * squared[1] * squared[2]) ** (-1.0 / 6.0)
-    beta, gamma, energy = np.zeros(3), np.zeros((3, 3)), 0.0
-    powers = np.empty(3)
+    _diagonalise(C, axes)
+    scale = (C[0, 0] * C[1, 1] * C[2, 2]) ** (-1.0 / 6.0)
     for term in range(n):
         mu, alpha = constants[4 + 2 * term], constants[5 + 2 * term]
         for a in range(3):
-            powers[a] = (scale * np.sqrt(squared[a])) ** alpha
+            powers[a] = (scale * np.sqrt(C[a, a])) ** alpha
         total = powers[0] + powers[1] + powers[2]
         energy += 2.0 * mu / alpha**2 * (total - 3.0)
         for a in range(3):
@@ -451,36 +486,14 @@ def _ogden(constants, F, tangent, P, A):
             for b in range(3):
                 gamma[a, b] += 2.0 * mu * (total / 9.0 - (powers[a] + powers[b]) / 3.0)
             gamma[a, a] += 2.0 * mu * powers[a]
-    S, moduli, transformation = (axes * (beta / squared)) @ axes.T, np.zeros((9, 9)), _congruence(axes)
-    _first_piola_kirchhoff(F, S, P)
-    if not tangent:
-        return energy
-    for a in range(3):
-        for b in range(3):
-            moduli[4 * a, 4 * b] = (gamma[a, b] - (2.0 * beta[a] if a == b else 0.0)) / (squared[a] * squared[b])
-            if a != b:
-                difference = squared[b] - squared[a]
-                shear = 0.5 * (gamma[b, b] - 2.0 * beta[b] - gamma[a, b]) / (squared[b] * squared[b])
-                if abs(difference) > EQUAL_STRETCHES * squared[b]:
-                    shear = (beta[b] / squared[b] - beta[a] / squared[a]) / difference
-                moduli[3 * a + b, 3 * a + b] = moduli[3 * a + b, 3 * b + a] = shear
-    _push_forward(F, S, transformation @ moduli @ transformation.T, A)
+    for c in range(3):
+        a, b = (c + 1) % 3, (c + 2) % 3
+        x, y = C[a, a], C[b, b]
+        shear[c] = 0.5 * (gamma[b, b] - 2.0 * beta[b] - gamma[a, b]) / (y * y)
+        if abs(y - x) > EQUAL_STRETCHES * y:
+            shear[c] = (beta[b] / y - beta[a] / x) / (y - x)
+    _from_principal_axes(F, axes, C, beta, gamma, shear, tangent, P, A)
     return energy
-
-
-@kernel
-def _other_law(constants, D, F, tangent, old, new, P, A):
-    """Apply a law other than `_invariants`; return the elastic energy density without the volumetric part."""
-    law = int(constants[0])
-    if law == LINEAR:
-        return _linear(D, F, tangent, P, A)
-    if law == PLASTIC:
-        return _plastic(constants, F, tangent, old, new, P, A)
-    if law == LOGARITHMIC:
-        return _logarithmic(constants, F, tangent, old, new, P, A)
-    if law == SAINT_VENANT:
-        return _saint_venant(D, F, tangent, P, A)
-    return _ogden(constants, F, tangent, P, A)
 
 
 @kernel
@@ -492,10 +505,21 @@ def evaluate_law(constants, D, F, J, G, volumetric, tangent, old, new, P, A):
     Hooke's law. J and G (3, 3) are the determinant of F and its derivative. If `tangent` is false, A is required only at
     small strains, and only where plastic flow occurs.
     """
+    law = int(constants[0])
     for e in range(9):
         new[e] = old[e]
-    if int(constants[0]) == INVARIANTS:
-        return _invariants(constants, F, J, G, volumetric, tangent, P, A)
-    energy = _other_law(constants, D, F, tangent, old, new, P, A)
-    _add_volumetric(F, G, volumetric, tangent or new[6] > old[6], P, A)
+    if law == INVARIANTS:
+        energy = _invariants(constants, F, J, G, volumetric, tangent, P, A)
+    elif law == LINEAR:
+        energy = _linear(D, F, tangent, P, A)
+    elif law == PLASTIC:
+        energy = plastic(constants, F, tangent, old, new, P, A)
+    elif law == LOGARITHMIC:
+        energy = _logarithmic(constants, F, tangent, old, new, P, A)
+    elif law == SAINT_VENANT:
+        energy = _saint_venant(D, F, tangent, P, A)
+    else:
+        energy = _ogden(constants, F, tangent, P, A)
+    if law != INVARIANTS:
+        add_volumetric(F, G, volumetric, tangent or new[6] > old[6], P, A)
     return energy

@@ -86,6 +86,7 @@ class NonlinearBodies:
         self._cells = {name: _rows_at_points(field.moduli_rows[name], name) for name in mesh.solids}
         self._averaged = field.averaged & (kinematics != "plane_stress")
         self._constants = self._constants_of_laws()
+        self._splits = {name: self._split(name) for name in mesh.solids}
         self._pattern: Sparsity = sparsity(mesh)
         self._blocks = len(self._pattern.indices), mesh.dim, mesh.dim
 
@@ -123,8 +124,8 @@ class NonlinearBodies:
         """The history before the first load step."""
         return {name: np.zeros((*numbers.shape, N_HISTORY)) for name, numbers in self._cells.items()}
 
-    def _split(self, name: str) -> tuple[Array, Array]:
-        """Return the moduli for an element type, and the bulk moduli (n_moduli, 2) for its dilatation.
+    def _split(self, name: str) -> tuple[Array, Array, Array]:
+        """Return the moduli for an element type, and bulk moduli (n_moduli, 2) and polynomials (n_q, m) for its dilatation.
 
         The bulk moduli are those of the projected dilatation and of the remainder, as in `dilatation.Split`. If the
         dilatation is projected, the moduli do not contain the bulk modulus.
@@ -141,7 +142,10 @@ class NonlinearBodies:
         shear = np.where(is_hookean, moduli[:, 3, 3], self._constants[:, 1])
         remainder = 0.0 if element.dilatation == element.order - 1 else np.minimum(bulk[:, 1], BULK_TO_SHEAR * shear)
         bulk[projected] = np.column_stack([bulk[:, 1] - remainder, np.broadcast_to(remainder, len(bulk))])[projected]
-        return moduli, bulk
+        polynomials = dilatation.basis(name, element.quadrature[0])
+        if element.dilatation == 0 and (bulk[:, 1] > 0.0).any():  # because the remainder is not a linear function
+            polynomials = polynomials[:, :1]
+        return moduli, bulk, np.ascontiguousarray(polynomials)
 
     def at(
         self, displacement: Array, old_history: Mapping[str, Array], *, rise: Array | None = None, geometric: int = COMPLETE,
@@ -195,10 +199,7 @@ class NonlinearBodies:
         flags = self.kinematics == "axisymmetric", self.kinematics == "plane_stress", self.finite, geometric
         for name, cells in mesh.solids.items():
             N, dN, weights = elements.get(name).tables
-            moduli, bulk = self._split(name)
-            polynomials = np.ascontiguousarray(dilatation.basis(name, elements.get(name).quadrature[0]))
-            if (bulk[:, 1] > 0.0).any():  # because the remainder is not a linear function
-                polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
+            moduli, bulk, polynomials = self._splits[name]
             owner, row_ranges = pattern.owners(mesh, name)
             cauchy = np.empty((*old_history[name].shape[:2], 6 if dim == 3 else 4))
             new = np.empty_like(old_history[name]) if self._has_history else old_history[name][:0]

@@ -90,6 +90,6 @@ def layer(contrast):
 @pytest.mark.filterwarnings("ignore:.*element across", "ignore:Young.s moduli differ")
 def test_a_layer_between_stiff_bodies_costs_as_much_at_any_contrast():
     steps = [fc.solve(layer(contrast), 1)[-1] for contrast in (1e6, 1e7)]
-    assert [step.iterations["active_set_iterations"] for step in steps] == [27, 27]  # ten of them on soft springs
+    assert [step.iterations["active_set_iterations"] for step in steps] == [25, 25]
     one, other = (step.contact["disc"].force for step in steps)
     np.testing.assert_allclose(one, other, rtol=1e-3)
