@@ -25,7 +25,6 @@ from fastcontact.analysis.wear import stability_ratio
 from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.formulations.continuous import Continuous
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
@@ -556,8 +555,11 @@ def _quadrature_error(
     Of `Continuous.quadrature_error`, the stiffer body carries the larger part. On blocks under a uniform pressure, the errors
     of nodal pressures were 0.8 to 1.4 times the estimate, and in press fits 0.5 to 2.5 times.
     """
-    if not isinstance(pair, Continuous) or isinstance(pair.primary, RigidSide) or pair.options.kind in ALWAYS_CLOSED:
+    if pair.name != "continuous" or isinstance(pair.primary, RigidSide) or pair.options.kind in ALWAYS_CLOSED:
         return
+    from fastcontact.contact.formulations.continuous import Continuous
+
+    assert isinstance(pair, Continuous)
     pressure = contact.pressure[contact.pressure > 0.0]
     if pair.options.cohesion is not None or pair.options.penalty is not None or not len(pressure):
         return
