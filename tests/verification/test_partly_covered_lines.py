@@ -86,6 +86,7 @@ def test_fields_are_as_rich_as_what_takes_part_determines(element, axisymmetric)
         assert np.array_equal(Z[independent], np.eye(len(independent)))
 
 
+@pytest.mark.filterwarnings("ignore:contact .pair.. the integration points of complete facets")
 @pytest.mark.parametrize("kind", ["unilateral", "bilateral", "tied", "friction"])
 @pytest.mark.parametrize("element", ["quad4", "quad8", "tri3", "tri6"])
 def test_contact_at_the_nodes_holds_the_node_on_the_axis(element, kind):
