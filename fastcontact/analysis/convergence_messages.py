@@ -149,8 +149,10 @@ def friction_note(problem: Problem, state: State) -> str:
         return ""
     ratios = []
     for name, forces in state.forces.items():
-        capacity = float((problem.pairs[name].friction or 0.0) * np.maximum(forces.pressure, 0.0).sum())
-        ratios += [float(np.linalg.norm(forces.traction, axis=1).sum()) / capacity] if capacity else []
+        pair = problem.pairs[name]
+        capacity = float((pair.friction or 0.0) * np.maximum(forces.pressing, 0.0).sum())
+        tangential = np.linalg.norm(forces.tangential[pair.secondary.points], axis=1)
+        ratios += [float(tangential.sum()) / capacity] if capacity else []
     if not ratios or min(ratios) < NEARLY_SLIDING:
         return ""
     return (

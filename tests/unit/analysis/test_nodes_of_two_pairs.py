@@ -92,6 +92,7 @@ def beside_a_third_body(formulation):
 
 
 @pytest.mark.parametrize("formulation", ["mortar", "continuous", "node_to_segment"])
+@pytest.mark.filterwarnings("ignore:.*integration points of complete facets")
 def test_a_pair_that_shares_no_nodes_keeps_its_pressures(formulation):
     """Nodes of a mortar that face nothing stand for no area, by which nothing may be divided."""
     side = solved(beside_a_third_body(formulation), "direct").contact["side"]

@@ -230,6 +230,7 @@ def test_sides_that_end_in_planes_of_symmetry(angle, multipliers, secondary):
     compare(make, [("pressure_max", "c")], changes)
 
 
+@pytest.mark.filterwarnings("ignore:.*integration points of complete facets")
 def test_heat_normals_and_loads_by_volume():
     mesh = fc.generate.rings("quad8", divisions_inner=(2, 5), divisions_outer=(2, 6))
 

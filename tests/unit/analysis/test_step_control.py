@@ -261,9 +261,10 @@ def test_a_cell_that_turns_inside_out_is_told_with_its_measure() -> None:
 
 
 @pytest.mark.parametrize(
-    ("strain", "friction", "end"), [("finite", 0.25, 0.3), ("finite", 0.25, 0.9), ("small", 0.5, 0.9)]
+    ("strain", "friction", "end", "halved"),
+    [("finite", 0.25, 0.3, True), ("finite", 0.25, 0.9, False), ("small", 0.5, 0.9, False)],
 )
-def test_a_beam_that_passes_a_disc_in_one_step_does_not_stick_to_it(strain, friction, end):
+def test_a_beam_that_passes_a_disc_in_one_step_does_not_stick_to_it(strain, friction, end, halved):
     """The equilibrium of a jammed beam exists, too, with a force of up to 1200."""
     element, n = ("quad8", (3, 34)) if strain == "small" else ("quad4", (2, 12))
     beam = block((1.5, 17.0), n, element, (0.0, -17.0)).merged_groups("SIDE", ["LEFT", "BOTTOM"])
@@ -273,4 +274,4 @@ def test_a_beam_that_passes_a_disc_in_one_step_does_not_stick_to_it(strain, fric
     with pytest.warns(fc.FastcontactWarning, match="never closed"):
         (step,) = fc.solve(model, [end])
     assert not step.contact["c"].force.any()
-    assert len(step.iterations["substeps"]) > 1
+    assert ("substeps" in step.iterations) == halved
