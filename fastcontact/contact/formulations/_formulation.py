@@ -57,7 +57,7 @@ from fastcontact.contact.projection import (
 )
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
-from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied_pair, with_rigid_arms
+from fastcontact.contact.tied import moments_of, reduction, tied_constraints, with_rigid_arms
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
@@ -221,8 +221,8 @@ class Formulation(ABC):
         ContactError
             If the pair has a penalty, and the constraints of its formulation have no areas.
         """
-        if self.tied is not None:
-            return self.tied.constraints()
+        if self._tied is not None:
+            return self._tied
         constraints = self.unilateral(config)
         has_penalty = self.options.penalty is not None or self.options.tangential_penalty is not None
         if has_penalty and self.options.cohesion is None:
@@ -280,7 +280,7 @@ class Formulation(ABC):
         return float(min(b.diameters(self.points).min() / elements.get(b.element).order for b in blocks))
 
     @cached_property
-    def tied(self) -> TiedPair | None:
+    def _tied(self) -> Constraints | None:
         """The equations of a tied pair, for the undeformed bodies; None for other pairs."""
         if self.options.kind != "tied":
             return None
@@ -290,7 +290,7 @@ class Formulation(ABC):
             pairing = pair(constraints.positions, self.primary, self.points, np.inf, "averaged")
             constraints = with_rigid_arms(constraints, pairing, self.primary, self.points)
         moments, areas = moments_of(constraints)
-        return tied_pair(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
+        return tied_constraints(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
         """Return the `tied.reduction` of the multipliers of a tied pair; None if supports hold both sides at no node."""
