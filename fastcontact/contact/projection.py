@@ -333,7 +333,7 @@ def along_normals(
     centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
     relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in side.blocks]
-    normals_and_nodes = zip(np.split(normals, np.cumsum(side.sizes)[:-1]), nodes_of_blocks, strict=True)
+    normals_and_nodes = zip(np.split(normals, side.offsets[1:-1]), nodes_of_blocks, strict=True)
     normals_of_blocks = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in normals_and_nodes]
     terms, directions = _polynomials(nodes_of_blocks), _polynomials(normals_of_blocks)
     parallel_map(

@@ -56,7 +56,7 @@ from fastcontact.contact.projection import (
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
-from fastcontact.contact.surface_smoothing import Smoothing, frames
+from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.contact.tied import moments_of, reduction, tied_constraints, with_rigid_arms
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
@@ -360,8 +360,7 @@ class Formulation(ABC):
         The `compliance`, if any, is `Constraints.compliance`.
         """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        added = self.added_gap(candidates, pairing, config)
-        gap0 += added if self.smoothing is None else added - self.smoothing_overlap(candidates, pairing, config)
+        gap0 += self.added_gap(candidates, pairing, config) - self.smoothing_overlap(candidates, pairing, config)
         constraints = Constraints(B, gap0, candidates.positions(self.points), compliance)
         directions: tuple[Array, ...] = ()
         if self.has_tangents:
@@ -399,7 +398,7 @@ class Formulation(ABC):
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.pair_candidates(candidates, config, np.inf)
         coordinates = self.points + config.displacement
-        slope = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, coordinates)
+        slope = self.smoothing_slope(candidates, pairing, rows, coordinates)
         options = self.primary, coordinates, self.normals, config.pose
         points = paired_points(candidates, pairing, rows, *options, slope=slope)
         if self.linearised_at_mean:
@@ -487,29 +486,29 @@ class Formulation(ABC):
         return added
 
     def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
-        """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length]."""
+        """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length].
+
+        They are zero without `smoothing`.
+        """
         overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
-        assert self.smoothing is not None
-        assert isinstance(self.primary, Surface)
-        if candidates.facet is None or candidates.xi is None:
+        if self.smoothing is None or candidates.facet is None or candidates.xi is None:
             return overlap
-        deformed = self.points + config.displacement
-        axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
-        on_secondary = candidates.facet[rows], candidates.xi[rows]
-        overlap[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
+        on_secondary, on_primary = (
+            (candidates.facet[rows], candidates.xi[rows]),
+            (pairing.facet[rows], pairing.xi[rows]),
+        )
+        overlap[rows] = self.smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
         return overlap
 
     def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
         """Return the derivatives (n, dim - 1) of `smoothing_overlap` with respect to primary reference coordinates [length].
 
         `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
-        zero on the straight extensions of facets.
+        zero on the straight extensions of facets, and None without `smoothing`.
         """
-        assert self.smoothing is not None
-        assert isinstance(self.primary, Surface)
-        if candidates.facet is None:
+        if self.smoothing is None or candidates.facet is None:
             return None
-        axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
+        axes = self.smoothing.frames(deformed)
         factor = self.smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
         slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
@@ -716,8 +715,7 @@ class Formulation(ABC):
         nodes = self.node_candidates
         pairing = self.pair_candidates(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
-        if self.smoothing is not None:
-            gap0 -= self.smoothing_overlap(nodes, pairing, config)
+        gap0 -= self.smoothing_overlap(nodes, pairing, config)
         if with_clearance:
             gap0 += self.added_gap(nodes, pairing, config)
         u = config.displacement if displacement is None else displacement

@@ -319,12 +319,13 @@ class WeightedMortar(Formulation):
         """
         deformed, (overlap, *_, nodal_map) = self.points + config.displacement, means.coverage
         is_loaded, coverages = nodal_map @ multiplier != 0.0, (means.coverage, *substitutes)
-        functions, tests, n_points, facet_offset = [list[Blocks]() for _ in coverages], list[Blocks](), 0, 0
+        functions, tests, n_points = [list[Blocks]() for _ in coverages], list[Blocks](), 0
         nodes, shapes, facets = [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, overlap.points, strict=True)
         for number, (block, T, quadrature_points) in enumerate(of_blocks):
             selected = is_loaded[block.local].any(axis=1)[quadrature_points.facet]
-            facet, shape, area = (array[selected] for array in quadrature_points)
+            arrays = quadrature_points.facet, quadrature_points.shape, quadrature_points.area
+            facet, shape, area = (array[selected] for array in arrays)
             columns = n_points + np.arange(len(facet))[:, None]
             local, weighted = block.local[facet], (area[:, None] * shape)[:, :, None]
             tests.append((local, columns, T @ weighted))
@@ -332,13 +333,13 @@ class WeightedMortar(Formulation):
                 entries.append((local, columns, coverage.functions[number][0][facet] @ weighted))
             nodes.append(block.facets[facet])
             shapes.append(shape)
-            facets.append(facet_offset + facet)
-            n_points, facet_offset = n_points + len(facet), facet_offset + len(block.facets)
+            facets.append(self.secondary.offsets[number] + facet)
+            n_points += len(facet)
         candidates = Candidates(padded(nodes), padded(shapes), np.concatenate(facets))
         pairing = pair(candidates.positions(deformed), self.primary, deformed, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        slope = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, deformed)
+        slope = self.smoothing_slope(candidates, pairing, rows, deformed)
         points = paired_points(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, slope)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
         weights, *substitute_weights = (scaled(matrix, 1.0 / means.weight) for matrix in integrals)
@@ -507,7 +508,7 @@ class WeightedMortar(Formulation):
             return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
         mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
         normals = (normals_at_nodes if self.normals == "facet" else smooth_normals)(self.primary, deformed)
-        of_blocks = np.split(normals, np.cumsum(self.primary.sizes)[:-1])
+        of_blocks = np.split(normals, self.primary.offsets[1:-1])
         normals_of = dict(zip((block.element for block in self.primary.blocks), of_blocks, strict=True))
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
