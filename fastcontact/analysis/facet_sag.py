@@ -127,8 +127,8 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     if smoothing is None or points.facet is None or points.xi is None or not in_contact.any():
         return 0.0, 0.0
     sag = np.full(len(points.nodes), np.nan)
-    on_secondary, on_primary = (points.facet[rows], points.xi[rows]), (pairing.facet[rows], pairing.xi[rows])
-    sag[rows] = smoothing.overlap(on_secondary, on_primary, deformed)
+    on_primary = pairing.facet[rows], pairing.xi[rows]
+    sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), on_primary, deformed)
     sag_in_contact = sag[rows[in_contact]]
     spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
     if pair.secondary.order == 2:

@@ -368,9 +368,8 @@ class Constraints:
 
     def coupled_gaps(self, forces: Array) -> Array:
         """Return the gaps and slips (1 + k, m) due to the compliances that couple constraints under `forces` (1 + k, m)."""
-        gaps = np.einsum(
-            "amh,h->am", self.low_rank_compliance, np.einsum("amh,am->h", self.low_rank_compliance, forces)
-        )
+        Z = self.low_rank_compliance
+        gaps = np.einsum("amh,h->am", Z, np.einsum("amh,am->h", Z, forces))
         return gaps if self.compliance is None else gaps + self._products_with_compliance(self.compliance, forces)
 
     def _products_with_compliance(self, C: MultiplierCompliance, forces: Array) -> Array:
@@ -425,11 +424,8 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     k, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
     branches = [pair.branches for pair in pairs if pair.branches is not None]
     tangents = [pair.tangents or (csr_array(pair.B.shape),) * k for pair in pairs]
-
-    concatenated: dict[str, Any] = {
-        name: np.concatenate([getattr(pair, name) for pair in pairs])
-        for name in ("gap0", "positions", "friction", "equality", "softness", "tangential_softness")
-    }
+    names = "gap0", "positions", "friction", "equality", "softness", "tangential_softness"
+    concatenated: dict[str, Any] = {name: np.concatenate([getattr(pair, name) for pair in pairs]) for name in names}
     for name in ("slip0", "elastic_slip"):  # zero for pairs without tangents
         concatenated[name] = np.hstack([np.resize(getattr(pair, name), (k, len(pair))) for pair in pairs])
     factors = [np.zeros((1 + k, *pair.low_rank_compliance.shape[1:])) for pair in pairs]

@@ -222,9 +222,8 @@ def closest(points: Array, nodes: Array) -> Closest:
     """
     points, nodes = np.ascontiguousarray(points), np.ascontiguousarray(nodes)
     n, dim = points.shape
-    result = Closest(
-        np.empty(n, np.intp), np.empty((n, dim - 1)), np.empty((n, dim)), np.empty(n), np.empty((n, dim)), np.empty(n)
-    )
+    numbers, xi = np.empty(n, np.intp), np.empty((n, dim - 1))
+    result = Closest(numbers, xi, np.empty((n, dim)), np.empty(n), np.empty((n, dim)), np.empty(n))
     if dim == 2:
         _project_onto_lines(points, nodes, result)
     else:
@@ -258,10 +257,9 @@ def _project_onto_lines(points: Array, nodes: Array, closest: Closest) -> None:
         hull = nodes.copy()
         hull[:, 2] = 2.0 * nodes[:, 2] - 0.5 * (nodes[:, 0] + nodes[:, 1])
     tree = build(hull.min(axis=1), hull.max(axis=1))
-    parallel_map(
-        lambda portion: search_2d_kernels.closest_facets(points, order, *portion, nodes, numbers, tree, closest),
-        portions(len(points)),
-    )
+    facets = nodes, numbers, tree
+    search = search_2d_kernels.closest_facets
+    parallel_map(lambda span: search(points, order, *span, *facets, closest), portions(len(points)))
 
 
 def _project_onto_faces(points: Array, nodes: Array, closest: Closest) -> None:
@@ -274,17 +272,12 @@ def _project_onto_faces(points: Array, nodes: Array, closest: Closest) -> None:
     centre = 0.5 * (nodes.min(axis=0).min(axis=0) + nodes.max(axis=0).max(axis=0))
     facets = Facets(nodes[numbers], centre, np.empty(nodes.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    parallel_map(
-        lambda portion: facets_3d_kernels.prepare(facets, *portion, table.to_terms, table.weights, low, high),
-        portions(n),
-    )
+    arguments = table.to_terms, table.weights, low, high
+    parallel_map(lambda span: facets_3d_kernels.prepare(facets, *span, *arguments), portions(n))
     tree, domain = build(low, high), Domain(table.nodes, flat_triangles(len(table.nodes)), table.sides)
-    parallel_map(
-        lambda portion: search_3d_kernels.closest_facets(
-            points, order, *portion, facets, domain, numbers, tree, closest
-        ),
-        portions(len(points)),
-    )
+    search = search_3d_kernels.closest_facets
+    searched = facets, domain, numbers, tree
+    parallel_map(lambda span: search(points, order, *span, *searched, closest), portions(len(points)))
 
 
 def _raise_failure(points: Array, facet: Indices, nodes: Array) -> None:
@@ -336,12 +329,9 @@ def along_normals(
     normals_and_nodes = zip(np.split(normals, side.offsets[1:-1]), nodes_of_blocks, strict=True)
     normals_of_blocks = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in normals_and_nodes]
     terms, directions = _polynomials(nodes_of_blocks), _polynomials(normals_of_blocks)
-    parallel_map(
-        lambda portion: projection_kernels.along_normals(
-            *portion, relative_points, heights, terms, directions, side.triangular, side.neighbours, projection
-        ),
-        portions(len(points)),
-    )
+    surface = terms, directions, side.triangular, side.neighbours
+    arguments = relative_points, heights, *surface, projection
+    parallel_map(lambda span: projection_kernels.along_normals(*span, *arguments), portions(len(points)))
     return projection
 
 

@@ -67,11 +67,9 @@ class SmoothSide:
     def slope(self, facet: Indices, xi: Array) -> Array:
         """Return the derivatives (n, dim - 1) of the heights with respect to the reference coordinates [length]."""
         k, m = self.heights.shape[1:]
-        derivatives = [
-            replace(self, heights=np.arange(1.0, k)[:, None] * self.heights[:, 1:]),
-            replace(self, heights=np.arange(1.0, m) * self.heights[:, :, 1:]),
-        ]
-        return np.stack([side.height(facet, xi) for side in derivatives[: xi.shape[1]]], axis=1)
+        first, second = np.arange(1.0, k)[:, None] * self.heights[:, 1:], np.arange(1.0, m) * self.heights[:, :, 1:]
+        derivatives = [replace(self, heights=heights) for heights in (first, second)[: xi.shape[1]]]
+        return np.stack([derivative.height(facet, xi) for derivative in derivatives], axis=1)
 
 
 @record

@@ -203,9 +203,8 @@ def _integrals(
         primary.nodes, primary.n_corners, opposite_to_terms @ primary.nodes, opposite_to_terms, _centre(opposite),
         pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, gap_reduction,
     )  # fmt: skip
-    failed = parallel.parallel_map(
-        lambda portion: _cut_faces_kernels.integrate(*portion, *arguments), parallel.portions(n, EFFORT)
-    )
+    spans = parallel.portions(n, EFFORT)
+    failed = parallel.parallel_map(lambda span: _cut_faces_kernels.integrate(*span, *arguments), spans)
     if max(failed) >= 0:
         first, second = (side.origin[row] for side, row in zip((secondary, primary), pairs[max(failed)], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")

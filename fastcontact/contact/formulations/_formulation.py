@@ -240,9 +240,8 @@ class Formulation(ABC):
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
             initial_gap = _values_at(self._initial_gaps, constraints.positions)
-            return cohesive_rows(
-                self.options.cohesion, constraints, config, initial_gap, self.modulus / self.shortest_edge
-            )
+            body_stiffness = self.modulus / self.shortest_edge
+            return cohesive_rows(self.options.cohesion, constraints, config, initial_gap, body_stiffness)
         equality = self.never_opening(constraints.positions, config)
         constraints = replace(constraints, equality=equality, friction=config.friction_factor * constraints.friction)
         if self.options.source is not None:
@@ -417,9 +416,8 @@ class Formulation(ABC):
             averaged = InterpolatedNormals.of_facets(self.primary, coordinates, pairing.facet[rows], feet)
             slip_normals = averaged, averaged.gradient(feet.gradient)
         nodal, local = NodalNormals(self.secondary, coordinates), self._number_on_side[candidates.nodes[rows]]
-        closing = ClosingMotion.of(
-            averaged.normal, InterpolatedNormals(nodal, local, candidates.shape[rows]), points.motion @ slips.start
-        )
+        secondary = InterpolatedNormals(nodal, local, candidates.shape[rows])
+        closing = ClosingMotion.of(averaged.normal, secondary, points.motion @ slips.start)
         slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return replace(linearised, slips=slips, slip_normals=slip_normals)
 
@@ -493,10 +491,8 @@ class Formulation(ABC):
         overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
         if self.smoothing is None or candidates.facet is None or candidates.xi is None:
             return overlap
-        on_secondary, on_primary = (
-            (candidates.facet[rows], candidates.xi[rows]),
-            (pairing.facet[rows], pairing.xi[rows]),
-        )
+        on_secondary = candidates.facet[rows], candidates.xi[rows]
+        on_primary = pairing.facet[rows], pairing.xi[rows]
         overlap[rows] = self.smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
         return overlap
 
@@ -664,8 +660,7 @@ class Formulation(ABC):
         """
         assert isinstance(self.primary, Surface)
         deformed, start = self.points + config.displacement, self.points + config.start
-        slip0 = np.zeros((len(directions), len(pairing.paired)))
-        rows = np.flatnonzero(pairing.paired)
+        slip0, rows = np.zeros((len(directions), len(pairing.paired))), np.flatnonzero(pairing.paired)
         feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         primary_normals = interpolate(smooth_normals(self.primary, deformed)[pairing.facet[rows]], feet)
@@ -675,8 +670,7 @@ class Formulation(ABC):
         offset = np.einsum("nk,nkd->nd", shape, start[nodes])
         offset -= np.einsum("nk,nkd->nd", feet.shape, start[feet.nodes])
         initial_gap = np.einsum("nd,nd->n", mean, offset)
-        for k, tangent in enumerate(directions):
-            slip0[k, rows] = np.einsum("nd,nd->n", tangent[rows], mean) * initial_gap
+        slip0[:, rows] = [np.einsum("nd,nd->n", tangent[rows], mean) * initial_gap for tangent in directions]
         return slip0
 
     def first_contact(self, config: Configuration) -> tuple[Array, Array]:

@@ -221,9 +221,8 @@ class WeightedMortar(Formulation):
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for axis, nodes_held in held:
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
-        mu, directions, slip_axes = self.options.friction_axes(
-            self.friction, tangents(normal, projectors), self.node_candidates
-        )
+        axes = tangents(normal, projectors)
+        mu, directions, slip_axes = self.options.friction_axes(self.friction, axes, self.node_candidates)
         slips, substitutions = self._slips(slip_axes, held, means)
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
