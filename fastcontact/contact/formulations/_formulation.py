@@ -326,9 +326,8 @@ class Formulation(ABC):
         If `tolerance` is given, it replaces `projection_tolerance`.
         """
         deformed = self.points + config.displacement
-        largest_overhang = self.projection_tolerance if tolerance is None else tolerance
+        largest_overhang = (self.projection_tolerance or 0.0) if tolerance is None else tolerance
         assert self.normals is not None
-        assert largest_overhang is not None
         positions = candidates.positions(deformed)
         pairing = pair(positions, self.primary, deformed, largest_overhang, self.normals, config.pose, config.rounded)
         if self.normals != "secondary":
@@ -630,8 +629,7 @@ class Formulation(ABC):
         closing = np.where(np.linalg.norm(normal_part, axis=1) > np.sqrt(0.5), closing, 0.0)
         slip -= closing[:, None] * pairing.normal
         tolerance = LENGTH_ROUND_OFF * max(np.abs(config.displacement).max(), np.abs(config.start).max())
-        common = deflate(common, slip, tolerance)
-        held[nodes] = common
+        held[nodes] = deflate(common, slip, tolerance)
         return held
 
     def _reflected(self, side: Surface, opposite: Surface | RigidSide) -> Surface:

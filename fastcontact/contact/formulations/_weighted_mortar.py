@@ -570,8 +570,7 @@ class WeightedPressures(NodalField):
     @property
     def covered(self) -> Array:
         """Covered fraction of the nodal areas; at mid-side nodes without a gap, the mean of the corners."""
-        usable = np.isfinite(self.weight)
-        has_area = usable & (self.full_areas > 0.0)
+        has_area = np.isfinite(self.weight) & (self.full_areas > 0.0)
         fraction = np.divide(self.weight, self.full_areas, out=np.zeros_like(self.weight), where=has_area)
         return self._at_nodes(fraction, only_without_gap=True)
 
