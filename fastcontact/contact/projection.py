@@ -257,9 +257,8 @@ def _project_onto_lines(points: Array, nodes: Array, closest: Closest) -> None:
         hull = nodes.copy()
         hull[:, 2] = 2.0 * nodes[:, 2] - 0.5 * (nodes[:, 0] + nodes[:, 1])
     tree = build(hull.min(axis=1), hull.max(axis=1))
-    facets = nodes, numbers, tree
-    search = search_2d_kernels.closest_facets
-    parallel_map(lambda span: search(points, order, *span, *facets, closest), portions(len(points)))
+    arguments = nodes, numbers, tree, closest
+    parallel_map(lambda span: search_2d_kernels.closest_facets(points, order, *span, *arguments), portions(len(points)))
 
 
 def _project_onto_faces(points: Array, nodes: Array, closest: Closest) -> None:
@@ -272,12 +271,11 @@ def _project_onto_faces(points: Array, nodes: Array, closest: Closest) -> None:
     centre = 0.5 * (nodes.min(axis=0).min(axis=0) + nodes.max(axis=0).max(axis=0))
     facets = Facets(nodes[numbers], centre, np.empty(nodes.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    arguments = table.to_terms, table.weights, low, high
-    parallel_map(lambda span: facets_3d_kernels.prepare(facets, *span, *arguments), portions(n))
+    tables_and_boxes = table.to_terms, table.weights, low, high
+    parallel_map(lambda span: facets_3d_kernels.prepare(facets, *span, *tables_and_boxes), portions(n))
     tree, domain = build(low, high), Domain(table.nodes, flat_triangles(len(table.nodes)), table.sides)
-    search = search_3d_kernels.closest_facets
-    searched = facets, domain, numbers, tree
-    parallel_map(lambda span: search(points, order, *span, *searched, closest), portions(len(points)))
+    arguments = facets, domain, numbers, tree, closest
+    parallel_map(lambda span: search_3d_kernels.closest_facets(points, order, *span, *arguments), portions(len(points)))
 
 
 def _raise_failure(points: Array, facet: Indices, nodes: Array) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
@@ -429,10 +429,9 @@ class Formulation(ABC):
         increment, rotation_gradient = config.displacement - config.start, None
         total = motion @ increment
         if isinstance(self.primary, RigidSide):
-            current, initial = (motion @ (self.points + u) for u in (config.displacement, config.start))
-            total -= self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
+            total -= self.rigid_motion(motion.__matmul__, config)
             if config.pose.angle != config.pose_start.angle:  # The motion is an affine function of the positions.
-                ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
+                ends = np.vstack([np.zeros(total.shape[1]), np.eye(total.shape[1])])
                 unit_motions = self.primary.rigid_motion(ends, ends[:1], config.pose, config.pose_start)
                 rotation_gradient = unit_motions[1:] - unit_motions[0]
         slip_data = directions, tangential, total, increment, self.points + config.start
@@ -462,7 +461,7 @@ class Formulation(ABC):
         rows = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0 = np.zeros((len(directions), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
-            obstacle_motion = self.rigid_motion(candidates, config)
+            obstacle_motion = self.rigid_motion(candidates.positions, config)
             slip0 = -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
         elif self.slip == "symmetric":
             slip0 = self._closing_slip(candidates, pairing, directions, config)
@@ -508,10 +507,13 @@ class Formulation(ABC):
         slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
-    def rigid_motion(self, candidates: Candidates, config: Configuration) -> Array:
-        """Return the displacements (n, dim) in the step of the obstacle points opposite to candidates [length]."""
+    def rigid_motion(self, positions: Callable[[Array], Array], config: Configuration) -> Array:
+        """Return the displacements (n, dim) in the step of the obstacle points opposite to n points [length].
+
+        `positions` is the function from the coordinates (n_points, dim) of all nodes to those of the points.
+        """
         assert isinstance(self.primary, RigidSide)
-        current, initial = (candidates.positions(self.points + u) for u in (config.displacement, config.start))
+        current, initial = (positions(self.points + u) for u in (config.displacement, config.start))
         return self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
 
     @cached_property
@@ -609,7 +611,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         common, slip = self.held_motions.projectors_at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
-            slip = slip - self.rigid_motion(Candidates.from_nodes(points), config)
+            slip = slip - self.rigid_motion(lambda coordinates: coordinates[points], config)
         else:
             rows = np.flatnonzero(pairing.paired)
             feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])

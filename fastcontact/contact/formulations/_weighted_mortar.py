@@ -227,11 +227,10 @@ class WeightedMortar(Formulation):
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
         # Part of the relative motion that is not slip: that of a rigid obstacle, or minus the motion that closes the gap.
-        if not isinstance(self.primary, RigidSide):
-            non_slip = -closing if self.slip == "symmetric" else np.zeros_like(closing)
+        if isinstance(self.primary, RigidSide):
+            non_slip = self.rigid_motion(motion.__matmul__, config)
         else:
-            current, initial = (motion @ (self.points + u) for u in (config.displacement, config.start))
-            non_slip = self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
+            non_slip = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         slip0 = -np.stack([np.einsum("nd,nd->n", t, non_slip) for t in slip_axes])
         for substitution, _ in substitutions:
             slip0 += np.stack([np.einsum("nd,nd->n", t, substitution.closing(closing)) for t in slip_axes])
