@@ -1,4 +1,4 @@
-"""Public names of packages and entries of dictionaries whose modules are imported on first use."""
+"""Public names of packages, entries of dictionaries and optional libraries that are imported on first use."""
 
 from __future__ import annotations
 
@@ -35,6 +35,16 @@ def lazy_names(package: str, title: str = "") -> tuple[Callable[[str], Any], Cal
         return value
 
     return attribute, lambda: sorted(module_of), public
+
+
+def import_library(name: str, title: str, install: str) -> Any:
+    """Import a library. Raises FileError with the installation command if the library is missing."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        from fastcontact.errors import FileError
+
+        raise FileError(f"{title} is not installed: pip install {install}") from error
 
 
 class LazyDict(Mapping[str, T]):

@@ -23,7 +23,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
-from fastcontact.contact.surface_smoothing import Smoothing, frames
+from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.mesh import elements, quadrature
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import TINY
@@ -126,9 +126,9 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     in_contact = closed[points.nodes[rows]].any(axis=1)
     if smoothing is None or points.facet is None or points.xi is None or not in_contact.any():
         return 0.0, 0.0
-    axes = [frames(side, pair.points, deformed) for side in (pair.secondary, pair.primary)]
     sag = np.full(len(points.nodes), np.nan)
-    sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (pairing.facet[rows], pairing.xi[rows]), axes)
+    on_primary = pairing.facet[rows], pairing.xi[rows]
+    sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), on_primary, deformed)
     sag_in_contact = sag[rows[in_contact]]
     spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
     if pair.secondary.order == 2:

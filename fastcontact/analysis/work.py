@@ -212,7 +212,7 @@ def contact_work(
     sliding = -0.5 * float(((tangential[0] + tangential[1]) * slips).sum())
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
-        displacement[pair.secondary.points] -= pair.rigid_motion(pair.node_candidates, configuration)
+        displacement[pair.secondary.points] -= pair.rigid_motion(pair.node_candidates.positions, configuration)
     work_after, energy_after = after.normal_work(before, displacement)
     work_before, energy_before = before.normal_work(after, displacement)
     gained = work_after + work_before + energy_after - energy_before

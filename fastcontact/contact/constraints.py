@@ -280,8 +280,8 @@ class Constraints:
         k, m = len(self.tangents), len(self.gap0)
         shapes: dict[str, tuple[int, ...]] = {"low_rank_compliance": (1 + k, m, 0)}
         shapes |= dict.fromkeys(("slip0", "elastic_slip"), (k, m))
-        of_each = "friction", "equality", "softness", "wear_softness", "tangential_softness", "prescribed"
-        shapes |= dict.fromkeys(of_each, (m,))
+        scalars = "friction", "equality", "softness", "wear_softness", "tangential_softness", "prescribed"
+        shapes |= dict.fromkeys(scalars, (m,))
         for name, shape in shapes.items():
             if not (values := getattr(self, name)).size:
                 object.__setattr__(self, name, np.zeros(shape, values.dtype))
@@ -368,9 +368,8 @@ class Constraints:
 
     def coupled_gaps(self, forces: Array) -> Array:
         """Return the gaps and slips (1 + k, m) due to the compliances that couple constraints under `forces` (1 + k, m)."""
-        gaps = np.einsum(
-            "amh,h->am", self.low_rank_compliance, np.einsum("amh,am->h", self.low_rank_compliance, forces)
-        )
+        Z = self.low_rank_compliance
+        gaps = np.einsum("amh,h->am", Z, np.einsum("amh,am->h", Z, forces))
         return gaps if self.compliance is None else gaps + self._products_with_compliance(self.compliance, forces)
 
     def _products_with_compliance(self, C: MultiplierCompliance, forces: Array) -> Array:
@@ -425,16 +424,12 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     k, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
     branches = [pair.branches for pair in pairs if pair.branches is not None]
     tangents = [pair.tangents or (csr_array(pair.B.shape),) * k for pair in pairs]
-
-    concatenated: dict[str, Any] = {
-        name: np.concatenate([getattr(pair, name) for pair in pairs])
-        for name in ("gap0", "positions", "friction", "equality", "softness", "tangential_softness")
-    }
+    names = "gap0", "positions", "friction", "equality", "softness", "tangential_softness"
+    concatenated: dict[str, Any] = {name: np.concatenate([getattr(pair, name) for pair in pairs]) for name in names}
     for name in ("slip0", "elastic_slip"):  # zero for pairs without tangents
         concatenated[name] = np.hstack([np.resize(getattr(pair, name), (k, len(pair))) for pair in pairs])
-    factors = [np.zeros((1 + k, *pair.low_rank_compliance.shape[1:])) for pair in pairs]
-    for factor, pair in zip(factors, pairs, strict=True):
-        factor[: 1 + len(pair.tangents)] = pair.low_rank_compliance
+    factors = [pair.low_rank_compliance for pair in pairs]  # empty for pairs without tangents
+    factors = [np.resize(factor, (1 + k, *factor.shape[1:])) for factor in factors]
     return StackedConstraints(
         B=csr_array(vstack([pair.B for pair in pairs], format="csr")),
         compliance=_BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
@@ -511,8 +506,8 @@ class _BlockDiagonal:
         for inner, (in_block, rows_of_pair) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
             if inner is not None and len(in_block):
                 d[in_block], P, S = inner.split(rows_of_pair)
-                place = np.ones(len(in_block)), (in_block, np.arange(len(in_block)))
-                P_blocks.append(csr_array(csr_array(place, (len(rows), len(in_block))) @ P))
+                entries = np.ones(len(in_block)), (in_block, np.arange(len(in_block)))
+                P_blocks.append(csr_array(csr_array(entries, (len(rows), len(in_block))) @ P))
                 S_blocks.append(S)
         return d, csr_array(hstack(P_blocks, format="csr")), block_diag(*S_blocks)
 

@@ -93,14 +93,11 @@ class AreaVectors:
             measure = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric)
             np.add.at(areas, block.local, (measure * weights) @ N**2)
             positions = (self.points + displacement)[block.facets]
-            by_facet, derivative = weighted_area_vectors(
-                positions, N, dN, np.broadcast_to(weights, measure.shape), N**2, self.axisymmetric
-            )
+            w = np.broadcast_to(weights, measure.shape)
+            by_facet, derivative = weighted_area_vectors(positions, N, dN, w, N**2, self.axisymmetric)
             np.add.at(vectors, block.local, by_facet)
-            rows, columns = (
-                (nodes[:, :, None] * dim + np.arange(dim)).reshape(len(nodes), -1)
-                for nodes in (block.local, block.facets)
-            )
+            dofs = (nodes[:, :, None] * dim + np.arange(dim) for nodes in (block.local, block.facets))
+            rows, columns = (numbers.reshape(len(numbers), -1) for numbers in dofs)
             blocks.append((rows, columns, derivative.reshape(*rows.shape, -1)))
         inverse = np.divide(1.0, areas, out=np.zeros(n), where=areas > 0.0)
         by_node = diags_array(np.repeat(inverse, dim)) @ assembled(blocks, (n * dim, self.points.size))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,10 +13,11 @@ from scipy.sparse.csgraph import connected_components
 
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import html_table
+from fastcontact._tools.lazy import import_library
 from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.facing_facets import FacingPoints, OuterFacets, facing_points
-from fastcontact.errors import ContactError, FileError
+from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.mesh.topology import bodies
 
@@ -99,9 +100,6 @@ class FoundContacts(Sequence[FoundContact]):
     def __getitem__(self, index: Any) -> Any:
         return self.pairs[index]
 
-    def __iter__(self) -> Iterator[FoundContact]:
-        return iter(self.pairs)
-
     def __repr__(self) -> str:
         if not self.pairs:
             return "no bodies that face each other"
@@ -117,11 +115,8 @@ class FoundContacts(Sequence[FoundContact]):
 
         Raises FileError if pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError as error:
-            raise FileError("to_pandas needs pandas: pip install pandas") from error
-        return pandas.DataFrame(self._rows(None), columns=list(_COLUMNS))
+        library = import_library("pandas", "pandas", "'fastcontact[table]'")
+        return cast("pandas.DataFrame", library.DataFrame(self._rows(None), columns=list(_COLUMNS)))
 
     def _rows(self, number_format: str | None) -> list[tuple[Any, ...]]:
         """Return the rows of the table, with lengths as strings in this format, or as numbers if it is None."""

@@ -89,13 +89,12 @@ class Candidates:
     @classmethod
     def from_side(cls, side: Surface) -> Candidates:
         """Return the nodes of a side as candidates; each is located on one of its facets."""
-        facet, xi, first = np.zeros(len(side.points), np.intp), np.zeros((len(side.points), 1)), 0
-        for block in side.blocks:
+        facet, xi = np.zeros(len(side.points), np.intp), np.zeros((len(side.points), 1))
+        for block, first in zip(side.blocks, side.offsets):
             xi_of_nodes = elements.get(block.element).nodes
             xi = np.broadcast_to(xi, (len(xi), xi_of_nodes.shape[1])).copy()
             facet[block.local] = first + np.arange(len(block.local))[:, None]
             xi[block.local] = xi_of_nodes
-            first += len(block.local)
         return cls(side.points[:, None], np.ones((len(side.points), 1)), facet, xi)
 
     def positions(self, coordinates: Array) -> Array:

@@ -222,9 +222,8 @@ def closest(points: Array, nodes: Array) -> Closest:
     """
     points, nodes = np.ascontiguousarray(points), np.ascontiguousarray(nodes)
     n, dim = points.shape
-    result = Closest(
-        np.empty(n, np.intp), np.empty((n, dim - 1)), np.empty((n, dim)), np.empty(n), np.empty((n, dim)), np.empty(n)
-    )
+    numbers, xi = np.empty(n, np.intp), np.empty((n, dim - 1))
+    result = Closest(numbers, xi, np.empty((n, dim)), np.empty(n), np.empty((n, dim)), np.empty(n))
     if dim == 2:
         _project_onto_lines(points, nodes, result)
     else:
@@ -258,10 +257,8 @@ def _project_onto_lines(points: Array, nodes: Array, closest: Closest) -> None:
         hull = nodes.copy()
         hull[:, 2] = 2.0 * nodes[:, 2] - 0.5 * (nodes[:, 0] + nodes[:, 1])
     tree = build(hull.min(axis=1), hull.max(axis=1))
-    parallel_map(
-        lambda portion: search_2d_kernels.closest_facets(points, order, *portion, nodes, numbers, tree, closest),
-        portions(len(points)),
-    )
+    arguments = nodes, numbers, tree, closest
+    parallel_map(lambda span: search_2d_kernels.closest_facets(points, order, *span, *arguments), portions(len(points)))
 
 
 def _project_onto_faces(points: Array, nodes: Array, closest: Closest) -> None:
@@ -274,17 +271,11 @@ def _project_onto_faces(points: Array, nodes: Array, closest: Closest) -> None:
     centre = 0.5 * (nodes.min(axis=0).min(axis=0) + nodes.max(axis=0).max(axis=0))
     facets = Facets(nodes[numbers], centre, np.empty(nodes.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    parallel_map(
-        lambda portion: facets_3d_kernels.prepare(facets, *portion, table.to_terms, table.weights, low, high),
-        portions(n),
-    )
+    tables_and_boxes = table.to_terms, table.weights, low, high
+    parallel_map(lambda span: facets_3d_kernels.prepare(facets, *span, *tables_and_boxes), portions(n))
     tree, domain = build(low, high), Domain(table.nodes, flat_triangles(len(table.nodes)), table.sides)
-    parallel_map(
-        lambda portion: search_3d_kernels.closest_facets(
-            points, order, *portion, facets, domain, numbers, tree, closest
-        ),
-        portions(len(points)),
-    )
+    arguments = facets, domain, numbers, tree, closest
+    parallel_map(lambda span: search_3d_kernels.closest_facets(points, order, *span, *arguments), portions(len(points)))
 
 
 def _raise_failure(points: Array, facet: Indices, nodes: Array) -> None:
@@ -333,15 +324,12 @@ def along_normals(
     centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
     relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in side.blocks]
-    normals_and_nodes = zip(np.split(normals, np.cumsum(side.sizes)[:-1]), nodes_of_blocks, strict=True)
+    normals_and_nodes = zip(np.split(normals, side.offsets[1:-1]), nodes_of_blocks, strict=True)
     normals_of_blocks = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in normals_and_nodes]
     terms, directions = _polynomials(nodes_of_blocks), _polynomials(normals_of_blocks)
-    parallel_map(
-        lambda portion: projection_kernels.along_normals(
-            *portion, relative_points, heights, terms, directions, side.triangular, side.neighbours, projection
-        ),
-        portions(len(points)),
-    )
+    surface = terms, directions, side.triangular, side.neighbours
+    arguments = relative_points, heights, *surface, projection
+    parallel_map(lambda span: projection_kernels.along_normals(*span, *arguments), portions(len(points)))
     return projection
 
 

@@ -106,6 +106,11 @@ class Surface:
         return sum(self.sizes)
 
     @cached_property
+    def offsets(self) -> Indices:
+        """Number of the first facet of each block, and the total number of facets."""
+        return np.cumsum([0, *self.sizes])
+
+    @cached_property
     def order(self) -> int:
         """Order of the facets: 1 if all facets are linear, otherwise 2."""
         return max(elements.get(block.element).order for block in self.blocks)

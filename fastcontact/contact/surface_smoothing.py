@@ -48,10 +48,15 @@ class SmoothSide:
         Coefficients of the powers of the reference coordinates, positive outward [length].
     curvature : ndarray (n_facets, dim - 1, dim - 1)
         Tensors along the `frames` of the facets, positive where the side is convex [1 / length].
+    side : Surface
+    points : ndarray (n_points, dim)
+        Reference coordinates of all points of the mesh [length].
     """
 
     heights: Array
     curvature: Array
+    side: Surface
+    points: Array
 
     def height(self, facet: Indices, xi: Array) -> Array:
         """Return the heights (n,) at the reference coordinates `xi` (n, dim - 1) of facets (n,) [length]."""
@@ -62,11 +67,9 @@ class SmoothSide:
     def slope(self, facet: Indices, xi: Array) -> Array:
         """Return the derivatives (n, dim - 1) of the heights with respect to the reference coordinates [length]."""
         k, m = self.heights.shape[1:]
-        derivatives = [
-            replace(self, heights=np.arange(1.0, k)[:, None] * self.heights[:, 1:]),
-            replace(self, heights=np.arange(1.0, m) * self.heights[:, :, 1:]),
-        ]
-        return np.stack([side.height(facet, xi) for side in derivatives[: xi.shape[1]]], axis=1)
+        first, second = np.arange(1.0, k)[:, None] * self.heights[:, 1:], np.arange(1.0, m) * self.heights[:, :, 1:]
+        derivatives = [replace(self, heights=heights) for heights in (first, second)[: xi.shape[1]]]
+        return np.stack([derivative.height(facet, xi) for derivative in derivatives], axis=1)
 
 
 @record
@@ -84,18 +87,21 @@ class Smoothing:
         if smooth_secondary is None or smooth_primary is None:
             return None
         smoothing = cls(smooth_secondary, smooth_primary)
-        axes = [frames(side, points, points) for side in (secondary, primary)]
         centres = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
         opposite = closest_of_types(np.concatenate(centres), primary.node_positions(points)).facet
-        factor = smoothing.height_factors(np.arange(len(opposite)), opposite, axes)
+        factor = smoothing.height_factors(np.arange(len(opposite)), opposite, smoothing.frames(points))
         is_corrected = factor[:, 0] * np.abs(smooth_secondary.heights).max(axis=(1, 2)) > 0.0
         is_corrected |= factor[:, 1] * np.abs(smooth_primary.heights[opposite]).max(axis=(1, 2)) > 0.0
         return smoothing if is_corrected.any() else None
 
+    def frames(self, coordinates: Array) -> list[Array]:
+        """Return the frames of all facets of both sides at `coordinates` (n_points, dim); see the function `frames`."""
+        return [frames(smooth.side, smooth.points, coordinates) for smooth in (self.secondary, self.primary)]
+
     def height_factors(self, secondary: Indices, primary: Indices, frames: Sequence[Array]) -> Array:
         """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other [-].
 
-        `frames` are the current tangents of all facets of both sides, see the function `frames`.
+        `frames` are the current tangents of all facets of both sides, see the method `frames`.
         """
         K_s = self.secondary.curvature[secondary]
         K_p = _in_plane_of(frames[0][secondary], frames[1][primary], self.primary.curvature[primary])
@@ -103,15 +109,13 @@ class Smoothing:
         squares = np.stack([np.einsum("nij,nij->n", K, K) for K in (K_s, K_p)], axis=1)
         return np.clip(np.divide(product[:, None], squares, out=np.zeros_like(squares), where=squares > 0.0), 0.0, 1.0)
 
-    def overlap(
-        self, secondary: tuple[Indices, Array], primary: tuple[Indices, Array], frames: Sequence[Array]
-    ) -> Array:
+    def overlap(self, secondary: tuple[Indices, Array], primary: tuple[Indices, Array], coordinates: Array) -> Array:
         """Return the distances (n,) by which the smooth surfaces are closer to each other than the facing facets [length].
 
-        `secondary` and `primary` are facets (n,) and reference coordinates (n, dim - 1) in them. For `frames`, see
-        `height_factors`.
+        `secondary` and `primary` are facets (n,) and reference coordinates (n, dim - 1) in them, and `coordinates`
+        (n_points, dim) the current coordinates of all points of the mesh [length].
         """
-        factor = self.height_factors(secondary[0], primary[0], frames)
+        factor = self.height_factors(secondary[0], primary[0], self.frames(coordinates))
         return factor[:, 0] * self.secondary.height(*secondary) + factor[:, 1] * self.primary.height(*primary)
 
 
@@ -157,24 +161,23 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     if np.linalg.svd(offset, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(offset):
         return None
     adjacency, nodes, valid = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
-    neighbourhood, start, fits = points[side.points[nodes]], 0, []
+    neighbourhood, fits = points[side.points[nodes]], []
     offset, is_valid = np.where(valid[:, :, None], neighbourhood, 0.0), valid[:, :, None]
     offset = np.where(is_valid, offset - (offset.sum(axis=1) / valid.sum(axis=1)[:, None])[:, None], 0.0)
     smallest = np.linalg.eigvalsh(offset.transpose(0, 2, 1) @ offset)[:, 0]
     # The nodes around each facet are in one plane.
     if (smallest <= (LENGTH_ROUND_OFF * np.linalg.norm(offset, axis=(1, 2))) ** 2).all():
         return None
-    for block in side.blocks:
+    for block, start in zip(side.blocks, side.offsets):
         rows = slice(start, start + len(block.facets))
         fit = _fit(block, points, neighbourhood[rows], valid[rows], 2 * side.order)
         is_determined = fit.extends_to(neighbourhood[rows], valid[rows])[:, None, None]
         heights, curvature, axes = _heights(block, points, fit, fit.error(neighbourhood[rows], valid[rows]))
         fits.append((heights * is_determined, curvature * is_determined, axes))
-        start += len(block.facets)
     heights, curvature, axes = map(np.concatenate, zip(*fits, strict=True))
     if not heights.any():
         return None
-    return SmoothSide(heights * _limiter(adjacency, curvature, axes)[:, None, None], curvature)
+    return SmoothSide(heights * _limiter(adjacency, curvature, axes)[:, None, None], curvature, side, points)
 
 
 def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:

@@ -24,7 +24,7 @@ from scipy.sparse import coo_array, csr_array, diags_array, eye_array, vstack
 
 from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.constraints import Constraints, NodalField
+from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.projection import facet_points, facets_containing
@@ -42,16 +42,8 @@ class TiedPair:
     ----------
     moments : csr_array (q, m)
         Matrix from the gaps at the m constraint points of the formulation to the q weighted gaps of the equations [-].
-    rows : tuple of csr_array (q, n_dofs)
-        Matrices from the displacements to the relative displacements along the normal and each tangent [-].
     directions : tuple of ndarray (m, dim)
         Tangents [-].
-    positions : ndarray (q, dim)
-        Approximate positions of the equations on the reference surface [length].
-    nodal : NodalField
-        Map from the forces at the constraint points to nodal pressures.
-    nodes : ndarray of int (q,), optional
-        Secondary nodes of the gaps, see `Constraints`.
     areas : ndarray (q,), optional
         Integrals of the test functions of the equations [area].
     reduction : csr_array (q dim, q dim), optional
@@ -60,22 +52,9 @@ class TiedPair:
     """
 
     moments: csr_array
-    rows: tuple[csr_array, ...]
     directions: tuple[Array, ...]
-    positions: Array
-    nodal: NodalField
-    nodes: Indices | None = None
-    areas: Array | None = None
-    reduction: csr_array | None = None
-
-    def constraints(self) -> Constraints:
-        """Return the equations as constraints."""
-        B = csr_array(vstack(self.rows, format="csr"))
-        n = B.shape[0]
-        positions = np.tile(self.positions, (len(self.rows), 1))
-        nodes = None if self.nodes is None else np.tile(self.nodes, len(self.rows))
-        equality = np.ones(n, bool)
-        return Constraints(B, np.zeros(n), positions, equality=equality, nodes=nodes, nodal=self.nodal, tied=self)
+    areas: Array | None
+    reduction: csr_array | None
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces at the constraint points of the formulation [force].
@@ -83,24 +62,33 @@ class TiedPair:
         `multiplier` (q dim,) are the multipliers of the equations [force].
         """
         multiplier = multiplier if self.reduction is None else self.reduction @ multiplier
-        components = [self.moments.T @ component for component in multiplier.reshape(len(self.rows), -1)]
+        components = [self.moments.T @ component for component in multiplier.reshape(-1, self.moments.shape[0])]
         return components[0], np.column_stack(components[1:])
 
 
-def tied_pair(
+def tied_constraints(
     constraints: Constraints, moments: csr_array, areas: Array | None, reduction: csr_array | None
-) -> TiedPair:
-    """Return the equations of a tied pair, given `constraints` with tangents; see `moments_of` and `TiedPair`."""
-    weights = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY)
-    positions = abs(moments) @ constraints.positions / weights[:, None]
+) -> Constraints:
+    """Return the equations of a tied pair: first those along the normal, then those along each tangent.
+
+    `constraints` are those of the formulation, with tangents. For the other arguments, see `moments_of` and `TiedPair`.
+    """
     rows = [csr_array(moments @ row) for row in (constraints.B, *constraints.tangents)]
+    weights, k = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY), len(rows)
     if reduction is not None:
-        reduced_rows, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(weights)
-        rows = [csr_array(reduced_rows[first : first + q]) for first in range(0, reduced_rows.shape[0], q)]
-    return TiedPair(
-        moments, tuple(map(_without_round_off, rows)), constraints.directions, positions, constraints.nodal_field,
-        constraints.nodes, areas, reduction,
-    )  # fmt: skip
+        rows = split_rows(csr_array(reduction.T @ vstack(rows, format="csr")), k)
+    B = csr_array(vstack([_without_round_off(row) for row in rows], format="csr"))
+    positions = np.tile(abs(moments) @ constraints.positions / weights[:, None], (k, 1))
+    nodes = None if constraints.nodes is None else np.tile(constraints.nodes, k)
+    tied, zeros = TiedPair(moments, constraints.directions, areas, reduction), np.zeros(B.shape[0])
+    equality = np.ones(len(zeros), bool)
+    return Constraints(B, zeros, positions, equality=equality, nodes=nodes, nodal=constraints.nodal_field, tied=tied)
+
+
+def split_rows(matrix: csr_array, k: int) -> list[csr_array]:
+    """Return k matrices with the same number of rows each, of which `matrix` is the stack."""
+    q = matrix.shape[0] // k
+    return [csr_array(matrix[first : first + q]) for first in range(0, k * q, q)]
 
 
 def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:

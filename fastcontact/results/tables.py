@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import csv
-import importlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.lazy import import_library
 from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array
-from fastcontact.errors import CaseError, FileError, check_known
+from fastcontact.errors import CaseError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line
 from fastcontact.results import layout
@@ -296,14 +296,6 @@ if TYPE_CHECKING:
 
 # Columns that `contact_frame` places before those of contact tables.
 STEP_COLUMNS = ("step", "load_factor", "contact")
-
-
-def import_library(name: str, title: str, install: str) -> Any:
-    """Import a library. Raises FileError with the installation command if the library is missing."""
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise FileError(f"{title} is not installed: pip install {install}") from error
 
 
 def _pyvista() -> Any:

@@ -444,6 +444,19 @@ def test_an_obstacle_holds_what_is_closed_and_moves_without_mass():
         assert found == pytest.approx([0.25, 0.75] if force else [0.5, 1.0], rel=1e-4)
 
 
+def test_a_plate_that_a_force_moves_presses_on_a_bar_of_two_tied_halves():
+    halves = union(
+        bar("quad8", "plane_strain", (1, 8), "LOW", 0.0, 0.5), bar("quad8", "plane_strain", (1, 8), "UP", 0.5, 0.5)
+    )
+    model = model_of(halves, "plane_strain", **{"LOW BOTTOM": "xy"}, LOW={"x": 0.0}, UP={"x": 0.0})
+    model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", kind="tied")
+    plate = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
+    model.add_obstacle("plate", secondary="UP TOP", obstacle=plate, force={"y": -0.01})
+    (step,) = fc.solve(model, 1)
+    found = fc.modes(model, step, 2, stress_stiffening=False).frequencies
+    assert found == pytest.approx([0.25, 0.75], rel=1e-4)
+
+
 def test_a_tightened_bolt_is_one_piece():
     """The sides of a pretension section keep their distance, as if the bar was whole."""
     mesh = bar("quad8", "plane_strain").with_facet_group("CUT", lambda x: np.abs(x[:, 1] - 0.5) < 1e-9, between=True)

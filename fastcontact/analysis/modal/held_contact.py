@@ -19,7 +19,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.contact.tied import TiedPair, moments_of
+from fastcontact.contact.tied import TiedPair, moments_of, split_rows
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
@@ -132,9 +132,10 @@ def _conditions(
     tangents = constraints.directions if tied is None else tied.directions
     directions = [np.asarray(moments @ tangent) for tangent in tangents]
     if tied is not None:
-        yield Conditions(tied.rows[0], nodes, areas)
+        normal_rows, *tangential_rows = split_rows(constraints.B, 1 + len(directions))
+        yield Conditions(normal_rows, nodes, areas)
         if directions:
-            yield _tangential_conditions(directions, tied.rows[1:], np.arange(n), nodes, areas)
+            yield _tangential_conditions(directions, tangential_rows, np.arange(n), nodes, areas)
         return
     closed = abs(moments) @ constraints.equality.astype(float) > 0.0
     sticking = np.zeros(len(closed), bool)

@@ -19,7 +19,7 @@ from fastcontact.contact.projection import closest_of_types
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import polynomial_degree, tables
 from fastcontact.contact.surface import FacetBlock, Surface
-from fastcontact.contact.surface_smoothing import Smoothing, frames
+from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
@@ -54,13 +54,13 @@ def face_overlap(
     primary_polygons = [_Polygons.of(block, deformed) for block in primary.blocks]
     centres = np.concatenate([polygons.origin for polygons in secondary_polygons])
     distance = closest_of_types(centres, primary.node_positions(deformed)).distance
-    axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
-    masses, couplings, gap_reductions, offset = [], [], [], 0
-    for polygons in secondary_polygons:
+    axes = None if smoothing is None else smoothing.frames(deformed)
+    masses, couplings, gap_reductions = [], [], []
+    for polygons, offset in zip(secondary_polygons, secondary.offsets):
         n, k = polygons.block.facets.shape
         reach = REACH * (distance[offset : offset + n] + polygons.radius)
-        mass, reduction, primary_offset = np.zeros((n, k, k)), np.zeros((n, k)), 0
-        for opposite in primary_polygons:
+        mass, reduction = np.zeros((n, k, k)), np.zeros((n, k))
+        for opposite, primary_offset in zip(primary_polygons, primary.offsets):
             pairs = _overlapping_pairs(polygons, opposite, reach)
             facets = slice(offset, offset + n), slice(primary_offset, primary_offset + len(opposite.nodes))
             heights = _heights(smoothing, pairs, facets, axes)
@@ -68,10 +68,8 @@ def face_overlap(
             couplings.append(coupling)
             mass += mass_of_block
             reduction += reduction_of_block
-            primary_offset += len(opposite.nodes)
         masses.append(mass)
         gap_reductions.append(reduction[:, :, None] * -polygons.axes[:, None, 2])
-        offset += n
     return Overlap(masses, couplings, gap_reductions, [])
 
 
@@ -89,7 +87,7 @@ def _heights(
     facets : (slice, slice)
         Ranges of the facets of the two blocks among all facets of their sides.
     axes : list of ndarray or None
-        `surface_smoothing.frames` of all facets of both sides.
+        `Smoothing.frames` of all facets of both sides.
 
     Returns
     -------
@@ -205,9 +203,8 @@ def _integrals(
         primary.nodes, primary.n_corners, opposite_to_terms @ primary.nodes, opposite_to_terms, _centre(opposite),
         pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, gap_reduction,
     )  # fmt: skip
-    failed = parallel.parallel_map(
-        lambda portion: _cut_faces_kernels.integrate(*portion, *arguments), parallel.portions(n, EFFORT)
-    )
+    spans = parallel.portions(n, EFFORT)
+    failed = parallel.parallel_map(lambda span: _cut_faces_kernels.integrate(*span, *arguments), spans)
     if max(failed) >= 0:
         first, second = (side.origin[row] for side, row in zip((secondary, primary), pairs[max(failed)], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastcontact._tools.records import record
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
 from fastcontact.contact.pairing import FACING, Candidates, pair
 from fastcontact.contact.projection import CORNER, closest, nodal_normals, normals_at_nodes
-from fastcontact.contact.surface import FacetBlock, Surface
-from fastcontact.contact.surface_smoothing import Smoothing, frames
+from fastcontact.contact.surface import FacetBlock, Surface, by_block
+from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
@@ -26,25 +26,10 @@ NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
 @record
-class LinePoints:
-    """Integration points of all segments of a block.
+class LinePoints(OverlapPoints):
+    """Integration points of all segments of a block of lines, with their reference coordinates `xi` (n,) [-]."""
 
-    Attributes
-    ----------
-    facet : ndarray of int (n,)
-        Facet of each point.
-    xi : ndarray (n,)
-        Reference coordinate of the point in its facet [-].
-    shape : ndarray (n, k)
-        Values of the k shape functions of the facet at the point [-].
-    area : ndarray (n,)
-        Integration weight in the reference configuration [area].
-    """
-
-    facet: Indices
     xi: Array
-    shape: Array
-    area: Array
 
 
 def line_points(
@@ -67,7 +52,7 @@ def line_points(
     area = np.linalg.norm(tangent, axis=1) * weight
     if axisymmetric:
         area *= 2 * np.pi * np.maximum(np.einsum("nk,nk->n", shape, nodes[:, :, 0]), 0.0)
-    return LinePoints(facet, xi, shape, area)
+    return LinePoints(facet, shape, area, xi)
 
 
 def _segments(
@@ -131,8 +116,8 @@ def _opposite_ends(
     """Return the points of a block on the normals at the ends of the primary side, as facets and reference coordinates."""
     # A tolerance of the order of round-off does not extend the side, because the cut would leave a sliver of this width.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
-    offset, facets, coordinates = 0, [], []
-    for primary_block in primary.blocks:
+    facets, coordinates = [], []
+    for primary_block, offset in zip(primary.blocks, primary.offsets):
         shape = elements.get(primary_block.element).shape
         inner_ends = primary.inner_ends[offset : offset + len(primary_block.facets)]
         for end, s in zip(np.repeat([0, 1], len(ends)), np.outer([-1.0, 1.0], ends).ravel(), strict=True):
@@ -144,7 +129,6 @@ def _opposite_ends(
             facet, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
             facets.append(facet % len(block.facets))
             coordinates.append(xi)
-        offset += len(primary_block.facets)
     facet, xi = np.concatenate(facets), np.concatenate(coordinates)
     is_inside = np.abs(xi) < LARGEST_CUT
     return facet[is_inside], xi[is_inside]
@@ -193,14 +177,12 @@ def line_overlap(
     smoothing : Smoothing or None
         The smooth surfaces that the facets approximate; None if gaps are measured between the facets.
     """
-    first = np.cumsum([0] + [len(block.facets) for block in primary.blocks])
-    masses, couplings, gap_reductions, overlap_points, facet_offset = [], [], [], [], 0
-    axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
-    for block in secondary.blocks:
+    masses, couplings, gap_reductions, overlap_points = [], [], [], []
+    for block, offset in zip(secondary.blocks, secondary.offsets):
         n, k = block.facets.shape
         points = line_points(block, primary, reference, deformed, axisymmetric, k + 2, tolerance)
-        positions = Candidates(block.facets[points.facet], points.shape).positions(deformed)
-        pairing = pair(positions, primary, deformed, tolerance)
+        candidates = Candidates(block.facets[points.facet], points.shape)
+        pairing = pair(candidates.positions(deformed), primary, deformed, tolerance)
         # Near a corner, the closest facet may be on a flank that does not face the point.
         is_opposed = np.einsum("nd,nd->n", normals_at(block, deformed, points), pairing.normal) < -FACING
         # Either all points of a segment face the other side or none, because too few points would not determine a field.
@@ -209,19 +191,20 @@ def line_overlap(
         mass = np.zeros((n, k, k))
         np.add.at(mass, points.facet, area[:, None, None] * points.shape[:, :, None] * points.shape[:, None, :])
         masses.append(mass)
-        overlap_points.append(OverlapPoints(points.facet, points.shape, area))
+        overlap_points.append(replace(points, area=area))
         gap_reduction = np.zeros((n, k, 2))
-        if smoothing is not None and axes is not None:
-            on_secondary = facet_offset + points.facet, points.xi[:, None]
-            volume = area * smoothing.overlap(on_secondary, (pairing.facet, pairing.xi), axes)
+        if smoothing is not None:
+            on_secondary = offset + points.facet, points.xi[:, None]
+            volume = area * smoothing.overlap(on_secondary, (pairing.facet, pairing.xi), deformed)
             vectors = (volume[:, None] * pairing.normal)[:, None]
             np.add.at(gap_reduction, points.facet, points.shape[:, :, None] * vectors)
         gap_reductions.append(gap_reduction)
-        facet_offset += n
-        for number, primary_block in enumerate(primary.blocks):
-            rows = np.flatnonzero((area > 0) & (pairing.facet >= first[number]) & (pairing.facet < first[number + 1]))
+        covered = np.flatnonzero(area > 0)
+        rows_of_blocks = by_block(pairing.facet[covered], primary.sizes)
+        for primary_block, (positions, primary_facet) in zip(primary.blocks, rows_of_blocks, strict=True):
+            rows = covered[positions]
             shape = elements.get(primary_block.element).shape(pairing.xi[rows])
             products = area[rows, None, None] * points.shape[rows, :, None] * shape[:, None, :]
-            pairs = np.column_stack([points.facet[rows], pairing.facet[rows] - first[number]])
+            pairs = np.column_stack([points.facet[rows], primary_facet])
             couplings.append(Coupling(block, primary_block, pairs, products))
     return Overlap(masses, couplings, gap_reductions, overlap_points)

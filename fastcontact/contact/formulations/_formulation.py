@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
@@ -56,8 +56,8 @@ from fastcontact.contact.projection import (
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
-from fastcontact.contact.surface_smoothing import Smoothing, frames
-from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied_pair, with_rigid_arms
+from fastcontact.contact.surface_smoothing import Smoothing
+from fastcontact.contact.tied import moments_of, reduction, tied_constraints, with_rigid_arms
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
@@ -221,8 +221,8 @@ class Formulation(ABC):
         ContactError
             If the pair has a penalty, and the constraints of its formulation have no areas.
         """
-        if self.tied is not None:
-            return self.tied.constraints()
+        if self._tied is not None:
+            return self._tied
         constraints = self.unilateral(config)
         has_penalty = self.options.penalty is not None or self.options.tangential_penalty is not None
         if has_penalty and self.options.cohesion is None:
@@ -240,9 +240,8 @@ class Formulation(ABC):
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
             initial_gap = _values_at(self._initial_gaps, constraints.positions)
-            return cohesive_rows(
-                self.options.cohesion, constraints, config, initial_gap, self.modulus / self.shortest_edge
-            )
+            body_stiffness = self.modulus / self.shortest_edge
+            return cohesive_rows(self.options.cohesion, constraints, config, initial_gap, body_stiffness)
         equality = self.never_opening(constraints.positions, config)
         constraints = replace(constraints, equality=equality, friction=config.friction_factor * constraints.friction)
         if self.options.source is not None:
@@ -280,7 +279,7 @@ class Formulation(ABC):
         return float(min(b.diameters(self.points).min() / elements.get(b.element).order for b in blocks))
 
     @cached_property
-    def tied(self) -> TiedPair | None:
+    def _tied(self) -> Constraints | None:
         """The equations of a tied pair, for the undeformed bodies; None for other pairs."""
         if self.options.kind != "tied":
             return None
@@ -290,7 +289,7 @@ class Formulation(ABC):
             pairing = pair(constraints.positions, self.primary, self.points, np.inf, "averaged")
             constraints = with_rigid_arms(constraints, pairing, self.primary, self.points)
         moments, areas = moments_of(constraints)
-        return tied_pair(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
+        return tied_constraints(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
         """Return the `tied.reduction` of the multipliers of a tied pair; None if supports hold both sides at no node."""
@@ -327,9 +326,8 @@ class Formulation(ABC):
         If `tolerance` is given, it replaces `projection_tolerance`.
         """
         deformed = self.points + config.displacement
-        largest_overhang = self.projection_tolerance if tolerance is None else tolerance
+        largest_overhang = (self.projection_tolerance or 0.0) if tolerance is None else tolerance
         assert self.normals is not None
-        assert largest_overhang is not None
         positions = candidates.positions(deformed)
         pairing = pair(positions, self.primary, deformed, largest_overhang, self.normals, config.pose, config.rounded)
         if self.normals != "secondary":
@@ -360,8 +358,7 @@ class Formulation(ABC):
         The `compliance`, if any, is `Constraints.compliance`.
         """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        added = self.added_gap(candidates, pairing, config)
-        gap0 += added if self.smoothing is None else added - self.smoothing_overlap(candidates, pairing, config)
+        gap0 += self.added_gap(candidates, pairing, config) - self.smoothing_overlap(candidates, pairing, config)
         constraints = Constraints(B, gap0, candidates.positions(self.points), compliance)
         directions: tuple[Array, ...] = ()
         if self.has_tangents:
@@ -399,7 +396,7 @@ class Formulation(ABC):
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.pair_candidates(candidates, config, np.inf)
         coordinates = self.points + config.displacement
-        slope = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, coordinates)
+        slope = self.smoothing_slope(candidates, pairing, rows, coordinates)
         options = self.primary, coordinates, self.normals, config.pose
         points = paired_points(candidates, pairing, rows, *options, slope=slope)
         if self.linearised_at_mean:
@@ -418,9 +415,8 @@ class Formulation(ABC):
             averaged = InterpolatedNormals.of_facets(self.primary, coordinates, pairing.facet[rows], feet)
             slip_normals = averaged, averaged.gradient(feet.gradient)
         nodal, local = NodalNormals(self.secondary, coordinates), self._number_on_side[candidates.nodes[rows]]
-        closing = ClosingMotion.of(
-            averaged.normal, InterpolatedNormals(nodal, local, candidates.shape[rows]), points.motion @ slips.start
-        )
+        secondary = InterpolatedNormals(nodal, local, candidates.shape[rows])
+        closing = ClosingMotion.of(averaged.normal, secondary, points.motion @ slips.start)
         slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return replace(linearised, slips=slips, slip_normals=slip_normals)
 
@@ -433,10 +429,9 @@ class Formulation(ABC):
         increment, rotation_gradient = config.displacement - config.start, None
         total = motion @ increment
         if isinstance(self.primary, RigidSide):
-            current, initial = (motion @ (self.points + u) for u in (config.displacement, config.start))
-            total -= self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
+            total -= self.rigid_motion(motion.__matmul__, config)
             if config.pose.angle != config.pose_start.angle:  # The motion is an affine function of the positions.
-                ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
+                ends = np.vstack([np.zeros(total.shape[1]), np.eye(total.shape[1])])
                 unit_motions = self.primary.rigid_motion(ends, ends[:1], config.pose, config.pose_start)
                 rotation_gradient = unit_motions[1:] - unit_motions[0]
         slip_data = directions, tangential, total, increment, self.points + config.start
@@ -466,7 +461,7 @@ class Formulation(ABC):
         rows = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0 = np.zeros((len(directions), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
-            obstacle_motion = self.rigid_motion(candidates, config)
+            obstacle_motion = self.rigid_motion(candidates.positions, config)
             slip0 = -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
         elif self.slip == "symmetric":
             slip0 = self._closing_slip(candidates, pairing, directions, config)
@@ -487,37 +482,38 @@ class Formulation(ABC):
         return added
 
     def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
-        """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length]."""
+        """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length].
+
+        They are zero without `smoothing`.
+        """
         overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
-        assert self.smoothing is not None
-        assert isinstance(self.primary, Surface)
-        if candidates.facet is None or candidates.xi is None:
+        if self.smoothing is None or candidates.facet is None or candidates.xi is None:
             return overlap
-        deformed = self.points + config.displacement
-        axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
         on_secondary = candidates.facet[rows], candidates.xi[rows]
-        overlap[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
+        on_primary = pairing.facet[rows], pairing.xi[rows]
+        overlap[rows] = self.smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
         return overlap
 
     def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
         """Return the derivatives (n, dim - 1) of `smoothing_overlap` with respect to primary reference coordinates [length].
 
         `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
-        zero on the straight extensions of facets.
+        zero on the straight extensions of facets, and None without `smoothing`.
         """
-        assert self.smoothing is not None
-        assert isinstance(self.primary, Surface)
-        if candidates.facet is None:
+        if self.smoothing is None or candidates.facet is None:
             return None
-        axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
+        axes = self.smoothing.frames(deformed)
         factor = self.smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
         slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
-    def rigid_motion(self, candidates: Candidates, config: Configuration) -> Array:
-        """Return the displacements (n, dim) in the step of the obstacle points opposite to candidates [length]."""
+    def rigid_motion(self, positions: Callable[[Array], Array], config: Configuration) -> Array:
+        """Return the displacements (n, dim) in the step of the obstacle points opposite to n points [length].
+
+        `positions` is the function from the coordinates (n_points, dim) of all nodes to those of the points.
+        """
         assert isinstance(self.primary, RigidSide)
-        current, initial = (candidates.positions(self.points + u) for u in (config.displacement, config.start))
+        current, initial = (positions(self.points + u) for u in (config.displacement, config.start))
         return self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
 
     @cached_property
@@ -615,7 +611,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         common, slip = self.held_motions.projectors_at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
-            slip = slip - self.rigid_motion(Candidates.from_nodes(points), config)
+            slip = slip - self.rigid_motion(lambda coordinates: coordinates[points], config)
         else:
             rows = np.flatnonzero(pairing.paired)
             feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
@@ -635,8 +631,7 @@ class Formulation(ABC):
         closing = np.where(np.linalg.norm(normal_part, axis=1) > np.sqrt(0.5), closing, 0.0)
         slip -= closing[:, None] * pairing.normal
         tolerance = LENGTH_ROUND_OFF * max(np.abs(config.displacement).max(), np.abs(config.start).max())
-        common = deflate(common, slip, tolerance)
-        held[nodes] = common
+        held[nodes] = deflate(common, slip, tolerance)
         return held
 
     def _reflected(self, side: Surface, opposite: Surface | RigidSide) -> Surface:
@@ -665,8 +660,7 @@ class Formulation(ABC):
         """
         assert isinstance(self.primary, Surface)
         deformed, start = self.points + config.displacement, self.points + config.start
-        slip0 = np.zeros((len(directions), len(pairing.paired)))
-        rows = np.flatnonzero(pairing.paired)
+        slip0, rows = np.zeros((len(directions), len(pairing.paired))), np.flatnonzero(pairing.paired)
         feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         primary_normals = interpolate(smooth_normals(self.primary, deformed)[pairing.facet[rows]], feet)
@@ -676,8 +670,7 @@ class Formulation(ABC):
         offset = np.einsum("nk,nkd->nd", shape, start[nodes])
         offset -= np.einsum("nk,nkd->nd", feet.shape, start[feet.nodes])
         initial_gap = np.einsum("nd,nd->n", mean, offset)
-        for k, tangent in enumerate(directions):
-            slip0[k, rows] = np.einsum("nd,nd->n", tangent[rows], mean) * initial_gap
+        slip0[:, rows] = [np.einsum("nd,nd->n", tangent[rows], mean) * initial_gap for tangent in directions]
         return slip0
 
     def first_contact(self, config: Configuration) -> tuple[Array, Array]:
@@ -716,8 +709,7 @@ class Formulation(ABC):
         nodes = self.node_candidates
         pairing = self.pair_candidates(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
-        if self.smoothing is not None:
-            gap0 -= self.smoothing_overlap(nodes, pairing, config)
+        gap0 -= self.smoothing_overlap(nodes, pairing, config)
         if with_clearance:
             gap0 += self.added_gap(nodes, pairing, config)
         u = config.displacement if displacement is None else displacement

@@ -6,7 +6,7 @@ rigid obstacle, Gauss quadrature over complete facets suffices, see `obstacle_ov
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -36,7 +36,8 @@ class Coupling:
     integrals: Array
 
 
-class OverlapPoints(NamedTuple):
+@record
+class OverlapPoints:
     """Integration points of a secondary block.
 
     Attributes
@@ -69,14 +70,14 @@ class Overlap:
         are the distances by which the smooth surfaces are closer to each other than the facets, see `surface_smoothing`
         [volume]. Against an obstacle, which has no nodes, the vectors are the positions of the opposite points instead, so
         that the weighted gaps are also correct in this case.
-    points : list of OverlapPoints
+    points : sequence of OverlapPoints
         For each block, the integration points; empty in 3D, where the mortar segments are divided into triangles.
     """
 
     mass: list[Array]
     couplings: list[Coupling]
     gap_reductions: list[Array]
-    points: list[OverlapPoints]
+    points: Sequence[OverlapPoints]
 
 
 def obstacle_overlap(

@@ -221,18 +221,16 @@ class WeightedMortar(Formulation):
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for axis, nodes_held in held:
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
-        mu, directions, slip_axes = self.options.friction_axes(
-            self.friction, tangents(normal, projectors), self.node_candidates
-        )
+        axes = tangents(normal, projectors)
+        mu, directions, slip_axes = self.options.friction_axes(self.friction, axes, self.node_candidates)
         slips, substitutions = self._slips(slip_axes, held, means)
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
         # Part of the relative motion that is not slip: that of a rigid obstacle, or minus the motion that closes the gap.
-        if not isinstance(self.primary, RigidSide):
-            non_slip = -closing if self.slip == "symmetric" else np.zeros_like(closing)
+        if isinstance(self.primary, RigidSide):
+            non_slip = self.rigid_motion(motion.__matmul__, config)
         else:
-            current, initial = (motion @ (self.points + u) for u in (config.displacement, config.start))
-            non_slip = self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
+            non_slip = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         slip0 = -np.stack([np.einsum("nd,nd->n", t, non_slip) for t in slip_axes])
         for substitution, _ in substitutions:
             slip0 += np.stack([np.einsum("nd,nd->n", t, substitution.closing(closing)) for t in slip_axes])
@@ -319,12 +317,13 @@ class WeightedMortar(Formulation):
         """
         deformed, (overlap, *_, nodal_map) = self.points + config.displacement, means.coverage
         is_loaded, coverages = nodal_map @ multiplier != 0.0, (means.coverage, *substitutes)
-        functions, tests, n_points, facet_offset = [list[Blocks]() for _ in coverages], list[Blocks](), 0, 0
+        functions, tests, n_points = [list[Blocks]() for _ in coverages], list[Blocks](), 0
         nodes, shapes, facets = [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, overlap.points, strict=True)
         for number, (block, T, quadrature_points) in enumerate(of_blocks):
             selected = is_loaded[block.local].any(axis=1)[quadrature_points.facet]
-            facet, shape, area = (array[selected] for array in quadrature_points)
+            arrays = quadrature_points.facet, quadrature_points.shape, quadrature_points.area
+            facet, shape, area = (array[selected] for array in arrays)
             columns = n_points + np.arange(len(facet))[:, None]
             local, weighted = block.local[facet], (area[:, None] * shape)[:, :, None]
             tests.append((local, columns, T @ weighted))
@@ -332,13 +331,13 @@ class WeightedMortar(Formulation):
                 entries.append((local, columns, coverage.functions[number][0][facet] @ weighted))
             nodes.append(block.facets[facet])
             shapes.append(shape)
-            facets.append(facet_offset + facet)
-            n_points, facet_offset = n_points + len(facet), facet_offset + len(block.facets)
+            facets.append(self.secondary.offsets[number] + facet)
+            n_points += len(facet)
         candidates = Candidates(padded(nodes), padded(shapes), np.concatenate(facets))
         pairing = pair(candidates.positions(deformed), self.primary, deformed, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        slope = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, deformed)
+        slope = self.smoothing_slope(candidates, pairing, rows, deformed)
         points = paired_points(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, slope)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
         weights, *substitute_weights = (scaled(matrix, 1.0 / means.weight) for matrix in integrals)
@@ -507,7 +506,7 @@ class WeightedMortar(Formulation):
             return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
         mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
         normals = (normals_at_nodes if self.normals == "facet" else smooth_normals)(self.primary, deformed)
-        of_blocks = np.split(normals, np.cumsum(self.primary.sizes)[:-1])
+        of_blocks = np.split(normals, self.primary.offsets[1:-1])
         normals_of = dict(zip((block.element for block in self.primary.blocks), of_blocks, strict=True))
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
@@ -570,8 +569,7 @@ class WeightedPressures(NodalField):
     @property
     def covered(self) -> Array:
         """Covered fraction of the nodal areas; at mid-side nodes without a gap, the mean of the corners."""
-        usable = np.isfinite(self.weight)
-        has_area = usable & (self.full_areas > 0.0)
+        has_area = np.isfinite(self.weight) & (self.full_areas > 0.0)
         fraction = np.divide(self.weight, self.full_areas, out=np.zeros_like(self.weight), where=has_area)
         return self._at_nodes(fraction, only_without_gap=True)
 

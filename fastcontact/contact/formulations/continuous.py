@@ -128,11 +128,8 @@ class Continuous(PressureFieldFormulation):
         """Return the integration points and weights on the reference facet of an element type."""
         if self.integration not in (None, *RULES):
             raise ContactError(unknown("integration rule", self.integration, RULES))
-        if self.integration == "simpson":
-            return _simpson(element)
-        if self.integration == "node":
-            return _at_nodes(element)
-        return self._gauss(element)
+        rules = {"simpson": _simpson, "node": _at_nodes}
+        return rules.get(self.integration or "gauss", self._gauss)(element)
 
     def _gauss(self, element: str) -> quadrature.Rule:
         """Return the Gauss rule with `n_gauss` points in each direction of the reference facet."""

@@ -193,9 +193,8 @@ class SegmentMortar(PressureFieldFormulation):
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
         """Return the class of the method for `dim` dimensions and the option `multipliers`."""
-        return (
-            WeightedMortar if dim == 3 or str(options.get("multipliers", "standard")) != "standard" else SegmentMortar
-        )
+        has_standard = str(options.get("multipliers", "standard")) == "standard"
+        return SegmentMortar if dim == 2 and has_standard else WeightedMortar
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
@@ -204,9 +203,9 @@ class SegmentMortar(PressureFieldFormulation):
         block = self.secondary.blocks[0]
         n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
         options = self.axisymmetric, n_gauss, self.projection_tolerance, self._borders
-        points = line_points(block, self.primary, self.points, deformed, *options)
-        facet, shape, area = points.facet, points.shape, points.area
-        candidates = Candidates(block.facets[facet], shape, facet, points.xi[:, None])
+        samples = line_points(block, self.primary, self.points, deformed, *options)
+        facet, shape, area = samples.facet, samples.shape, samples.area
+        candidates = Candidates(block.facets[facet], shape, facet, samples.xi[:, None])
         pairing_of_points = self.pair_candidates(candidates, config)
         paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
@@ -218,13 +217,9 @@ class SegmentMortar(PressureFieldFormulation):
         usable_area, (n, k) = np.where(usable, area, 0.0), block.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        nodes_and_shapes, areas, dependent = (
-            (block.local[facet], shape),
-            (usable_area, area),
-            self.dependent_nodes(config),
-        )
-        values = self.with_common_values(independent_values(self.secondary, self._complete_facets, mass, dependent))
-        field = PressureField.of_points(nodes_and_shapes, areas, self._rho, values, has_new_points=True)
+        points, areas = (block.local[facet], shape), (usable_area, area)
+        values = independent_values(self.secondary, self._complete_facets, mass, self.dependent_nodes(config))
+        field = PressureField.of_points(points, areas, self._rho, self.with_common_values(values), has_new_points=True)
         return self.constraints_of_points(candidates, pairing, field, config)
 
 

@@ -119,8 +119,8 @@ def _ridges(side: Surface) -> tuple[Indices, Indices, Indices]:
 
     The nodes are both ends and the middle. An end takes the place of a missing middle node, and in 2D all three are the same.
     """
-    facets, nodes, signs, start = [], [], [], 0
-    for block in side.blocks:
+    facets, nodes, signs = [], [], []
+    for block, start in zip(side.blocks, side.offsets):
         element = elements.get(block.element)
         ridges = block.local[:, np.array([(0, 0), (1, 1)] if element.dim == 1 else element.edges)]
         sign = np.sign(ridges[..., 1] - ridges[..., 0])
@@ -129,7 +129,6 @@ def _ridges(side: Surface) -> tuple[Indices, Indices, Indices]:
         end, middles = ridges[..., 0], slice(element.n_corners, element.n_corners + len(element.edges))
         middle = block.local[:, middles] if element.dim == 2 and element.order == 2 else end
         nodes.append(np.stack([*np.sort(ridges, axis=2).transpose(2, 0, 1), middle], axis=2).reshape(-1, 3))
-        start += len(ridges)
     return np.concatenate(facets), np.concatenate(nodes), np.concatenate(signs)
 
 
