@@ -1,4 +1,4 @@
-"""Public names of packages, entries of dictionaries and optional libraries that are imported on first use."""
+"""Lazy import of the public names of packages, of the values of dictionaries, and of optional libraries."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def lazy_names(package: str, title: str = "") -> tuple[Callable[[str], Any], Cal
 
             return getattr_and_dir(title or package, public)[0](name)
         owner = importlib.import_module(module_of[name])
-        is_module = hasattr(owner, "__path__")  # the public names of packages are modules
+        is_module = hasattr(owner, "__path__")  # a name that the stub imports from a package is a module
         value = importlib.import_module(f"{owner.__name__}.{name}") if is_module else getattr(owner, name)
         setattr(sys.modules[package], name, value)
         return value

@@ -177,11 +177,11 @@ def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> 
         if model.strain == "finite":
             areas = lumped_areas(pair.secondary, pair.points + step.displacement, pair.axisymmetric)
         work += contact.dissipation
-        resultants.append(_resultants(contact, areas * _covered(pair, step, name), pair.axisymmetric, work))
+        resultants.append(_resultants(contact, areas * _covered_fraction(pair, step, name), pair.axisymmetric, work))
     return resultants
 
 
-def _covered(pair: Formulation, step: StepResult, name: str) -> Array | float:
+def _covered_fraction(pair: Formulation, step: StepResult, name: str) -> Array | float:
     """Return the fraction (n_nodes,) of the tributary areas that has an opposite side; 1 against obstacles [-]."""
     if isinstance(pair.primary, RigidSide):
         return 1.0
@@ -264,9 +264,10 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
     """Return the wear depth at the secondary nodes of a contact pair by Archard's law, accumulated over the load steps.
 
     ``depth = sum of coefficient * integral of pressure over slip``. With friction the integral of a step is
-    `ContactResult.sliding_load`. Without friction it is the slip times the mean of the pressures at both ends, where slip is
-    the tangential displacement of a node relative to the opposite side at the end of the step. The geometry does not change;
-    use the option ``wear`` of the contact pair to include its change.
+    `ContactResult.sliding_load`. Without friction it is the slip times the mean of the pressures at the beginning and at the
+    end of the step. The slip is then the tangential displacement of a node in the step, relative to the point of the other
+    side that is opposite it at the end. The geometry does not change; use the option ``wear`` of the contact pair to include
+    its change.
 
     Parameters
     ----------
@@ -312,7 +313,7 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
         raise ContactError(f"the coefficient of wear {coefficient} must be a number, zero or more")
     pair = _formulation(model, name)
     depth, depths = np.zeros(len(pair.secondary.points)), []
-    before: StepResult | None = None
+    previous: StepResult | None = None
     for number, step in enumerate(steps, 1):
         _result_of_pair(pair, step, name)
         if step.index != number:
@@ -320,19 +321,19 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
                 f"wear accumulates over all load steps: step {number} was expected, but got step {step.index}; pass all "
                 "steps in order, beginning with the first"
             )
-        pressure = 0.0 if before is None else before.contact[name].pressure
-        depth = depth + wear_depth_in_step(pair, end_of(before, step, name), step.contact[name], pressure, coefficient)
+        end, pressure = end_of(previous, step, name), 0.0 if previous is None else previous.contact[name].pressure
+        depth = depth + wear_depth_in_step(pair, end, step.contact[name], pressure, coefficient)
         depths.append(depth)
-        before = step
+        previous = step
     return np.array(depths).reshape(len(depths), len(depth))
 
 
-def end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
-    """Return the configuration of a contact pair at the end of a step that follows the step `before`, or starts at rest."""
+def end_of(previous: StepResult | None, step: StepResult, name: str) -> Configuration:
+    """Return the configuration of a contact pair at the end of a step; `previous` is None for the first step."""
     end = replace(Configuration.displaced(step.displacement), pose=pose_of(step.contact[name]))
-    if before is None:
+    if previous is None:
         return end
-    return replace(end, start=before.displacement, pose_start=pose_of(before.contact[name]))
+    return replace(end, start=previous.displacement, pose_start=pose_of(previous.contact[name]))
 
 
 def pose_of(contact: ContactResult) -> Pose:
@@ -397,36 +398,37 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     """
     _check(model, step)
     supported, _ = model.prescribed()
-    related = [relation for _, relation in model.related_supports]
-    coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
-    reaction, forces = _at_supports(model, [*related, *coupling], supported, step.reaction, step.displacement)
-    by_support: dict[str, Array] = {}
+    relations = [relation for _, relation in model.related_supports]
+    relations += [relation for relation in model.relations if not any(relation is support for support in relations)]
+    reaction, forces = _support_forces(model, relations, supported, step.reaction, step.displacement)
+    resultants: dict[str, Array] = {}
     unassigned = np.where(supported, reaction, 0.0)
     for support in model.supports:
         nodes, k = model.mesh.points_of(support.group), support.component
-        by_support.setdefault(support.group, np.zeros(supported.shape[1]))[k] += unassigned[nodes, k].sum()
+        resultants.setdefault(support.group, np.zeros(supported.shape[1]))[k] += unassigned[nodes, k].sum()
         unassigned[nodes, k] = 0.0
     for (group, relation), force in zip(model.related_supports, forces, strict=False):
         resultant = (relation.rows.T @ force).reshape(supported.shape).sum(axis=0)
-        by_support[group] = by_support.get(group, 0.0) + resultant
-    return by_support
+        resultants[group] = resultants.get(group, 0.0) + resultant
+    return resultants
 
 
 def reference_reactions(
     model: Model, points: Mapping[str, tuple[int, int]], reaction: Array, u: Array
 ) -> dict[str, dict[str, list[float]]]:
-    """Return `StepResult.reference_reactions` of the `points` that `Problem.reference_points` contains.
+    """Return `StepResult.reference_reactions`, from the reactions [force] and displacements `u` [length] (n_points, dim).
 
-    The arguments are the reactions [force] and displacements `u` [length] (n_points, dim).
+    For each supported reference point, `points` contains the numbers of the two points of the mesh that represent its
+    displacement and its rotation, see `Problem.reference_points`.
     """
-    nodal, moments = _at_supports(model, model.relations, model.prescribed()[0], reaction, u)[0], 2 * model.mesh.dim - 3
+    nodal = _support_forces(model, model.relations, model.prescribed()[0], reaction, u)[0]
     return {
-        name: {"force": nodal[point].tolist(), "moment": nodal[rotation, :moments].tolist()}
+        name: {"force": nodal[point].tolist(), "moment": nodal[rotation, : 2 * model.mesh.dim - 3].tolist()}
         for name, (point, rotation) in points.items()
     }
 
 
-def _at_supports(
+def _support_forces(
     model: Model, relations: Sequence[MultiPointConstraint], supported: Mask, reaction: Array, u: Array
 ) -> tuple[Array, list[Array]]:
     """Return the nodal forces (n_points, dim) of supports, and the Lagrange multipliers of each of the `relations` [force].
@@ -448,8 +450,8 @@ def multipliers(reaction: Array, rows: Sequence[csr_array], supported: Mask) -> 
     """
     if not rows:
         return []
-    free = csr_array(csr_array(vstack(rows, format="csr"))[:, np.flatnonzero(~supported)])
-    multiplier = lsqr(free.T, reaction[~supported], atol=1e-14, btol=1e-14, iter_lim=20 * sum(free.shape))[0]
+    columns = csr_array(csr_array(vstack(rows, format="csr"))[:, np.flatnonzero(~supported)])
+    multiplier = lsqr(columns.T, reaction[~supported], atol=1e-14, btol=1e-14, iter_lim=20 * sum(columns.shape))[0]
     return np.split(multiplier, np.cumsum([block.shape[0] for block in rows])[:-1])
 
 
@@ -515,10 +517,10 @@ def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
     """
     steps = list(steps)
     names = list(dict.fromkeys(name for step in steps for name in step.pretension))
-    columns_of = [(name, kind) for name in names for kind in ("force", "shortening")]
-    forces = ([step.pretension.get(name, {}).get(kind, np.nan) for name, kind in columns_of] for step in steps)
-    rows = [(step.index, step.load_factor, *values) for step, values in zip(steps, forces, strict=True)]
-    columns = [(f"{name}_{kind}", float) for name, kind in columns_of]
+    quantities = [(name, quantity) for name in names for quantity in ("force", "shortening")]
+    values = ([step.pretension.get(name, {}).get(quantity, np.nan) for name, quantity in quantities] for step in steps)
+    rows = [(step.index, step.load_factor, *row) for step, row in zip(steps, values, strict=True)]
+    columns = [(f"{name}_{quantity}", float) for name, quantity in quantities]
     return np.array(rows, [("step", int), ("load_factor", float), *columns])
 
 

@@ -147,17 +147,17 @@ def sensitivities(
     >>> round(result.value, 9), round(result.derivatives["E", "BLOCK"], 9)
     (1.0, 0.001)
     """
-    tuples = [tuple(parameter) for parameter in parameters]
-    check_labels(model, quantity, parameters)
+    keys = [tuple(parameter) for parameter in parameters]
+    check_arguments(model, quantity, parameters)
     problem, contact = recomputed_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
     distance = checked_margin(contact, margin) if problem.pairs else 1.0
     contact, gradient = with_gradient(contact, step, tuple(quantity))
-    changes = [KINDS[str(parameter[0])][2](contact, parameter) for parameter in tuples]
+    changes = [KINDS[str(parameter[0])][2](contact, parameter) for parameter in keys]
     values, solutions = _derivatives(contact, gradient, changes)
-    return Sensitivities(gradient.value, dict(zip(tuples, values.tolist(), strict=True)), distance, solutions)
+    return Sensitivities(gradient.value, dict(zip(keys, values.tolist(), strict=True)), distance, solutions)
 
 
-def check_labels(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
+def check_arguments(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
     """Raise ModelError or MeshError if a model has no such quantity or parameter, see `sensitivities`."""
     model.refuse_nonlinear("sensitivities are")
     if model.conducts:
@@ -207,8 +207,8 @@ def recomputed_step(
     restart.check(step, case, model)
     model.check(ramp)
     problem = prepare(stage_of(model, step), ramp, criteria, linear_solver=linear_solver)
-    touched = frozenset(name for name, contact in step.contact.items() if contact.active.any())
-    state, load = restart.put_back(problem, step, touched), problem.load_at(step.load_factor)
+    closed_pairs = frozenset(name for name, contact in step.contact.items() if contact.active.any())
+    state, load = restart.put_back(problem, step, closed_pairs), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
     equilibrium = newton(prepare_start(problem, state, step.index, load), load)
     u, no_values, inactive = equilibrium.u, np.empty(0), np.empty(0, bool)
@@ -246,13 +246,13 @@ def _check_independent_of_path(model: Model, step: StepResult, criteria: Criteri
         )
 
 
-def checked_margin(contact: MovingContact, least: float) -> float:
+def checked_margin(contact: MovingContact, margin: float) -> float:
     """Return the distance of the active set from a change, see `Sensitivities.margin`.
 
     Raises
     ------
     ModelError
-        If it is less than `least`.
+        If this distance is less than `margin`.
     """
     constraints, solution = contact.constraints, contact.solution
     largest_u = float(np.abs(contact.u).max(initial=0.0))
@@ -266,7 +266,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
         largest_force = float(np.abs(force).max(initial=0.0)) or 1.0
         distance[rows] = np.where(active, force / largest_force, np.where(usable, gap[rows] / largest_u, np.inf))
     distance[constraints.equality] = np.inf
-    critical = np.flatnonzero(~(distance >= least))
+    critical = np.flatnonzero(~(distance >= margin))
     if len(critical):
         nodes = nearest_nodes(contact.problem, constraints, critical)
         largest_distance = float(np.abs(distance[critical]).max())
@@ -275,7 +275,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
         count_text = "1 constraint is" if len(critical) == 1 else f"{len(critical)} constraints are"
         raise ModelError(
             f"{count_text} about to {change}, at {named_nodes(contact.problem, nodes)}: forces or gaps are "
-            f"{largest_distance:.1e} of the largest, less than margin = {least:g}. The one-sided derivatives differ there. "
+            f"{largest_distance:.1e} of the largest, less than margin = {margin:g}. The one-sided derivatives differ there. "
             f"{REMEDY}"
         )
     return min(1.0, float(distance.min(initial=1.0)))

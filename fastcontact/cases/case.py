@@ -341,7 +341,7 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list
     """Return the quantities and the parameters of the tables ``[[sensitivity]]``."""
     sensitivities, entries = [], list_of_tables("sensitivity", data.get("sensitivity", []))
     if entries:
-        from fastcontact.analysis.sensitivities import check_labels  # imports most of the solver
+        from fastcontact.analysis.sensitivities import check_arguments  # imports most of the solver
     for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
         check_keys(where, entry, keys.SENSITIVITY, keys.SENSITIVITY)
@@ -353,7 +353,7 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list
             )
         quantity, *by = map(tuple, labels)
         with errors_at(where):
-            check_labels(model, quantity, by)
+            check_arguments(model, quantity, by)
         sensitivities.append((quantity, by))
     return sensitivities
 

@@ -23,11 +23,11 @@ from typing import Any
 DELAY = 0.05  # time after which a signal is sent again [s]
 # Time after a signal in which further signals are ignored as repetitions [s].
 REPETITION_TIME = 0.5
-HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+DEFAULT_HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):
-    HANDLERS[signal.SIGHUP] = signal.SIG_DFL
+    DEFAULT_HANDLERS[signal.SIGHUP] = signal.SIG_DFL
 # Exit codes by signal, as in shells.
-EXIT_CODES: dict[int, int] = {number: 128 + number for number in HANDLERS}
+EXIT_CODES: dict[int, int] = {number: 128 + number for number in DEFAULT_HANDLERS}
 IMPORT_MODULES = ("importlib._bootstrap", "_frozen_importlib")
 COMMAND_LINE = "fastcontact.cli._main"
 
@@ -42,7 +42,7 @@ def interruptible(received_signals: list[int] | None = None) -> Iterator[None]:
     times: list[float] = []  # times of the signals whose exception was not discarded [s]
     received_signals = [] if received_signals is None else received_signals
     in_main_thread = threading.current_thread() is threading.main_thread()
-    numbers = [number for number, default in HANDLERS.items() if in_main_thread and signal.getsignal(number) == default]
+    numbers = [n for n, default in DEFAULT_HANDLERS.items() if in_main_thread and signal.getsignal(n) == default]
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if times and time.monotonic() - times[-1] < REPETITION_TIME:
@@ -61,7 +61,7 @@ def interruptible(received_signals: list[int] | None = None) -> Iterator[None]:
             yield
     finally:
         for number in numbers:
-            signal.signal(number, HANDLERS[number])
+            signal.signal(number, DEFAULT_HANDLERS[number])
 
 
 @contextlib.contextmanager

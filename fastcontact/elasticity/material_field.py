@@ -102,9 +102,9 @@ class MaterialField:
         It is the largest ratio of the extreme eigenvalues of the moduli for normal strains, minus one, divided by three. In
         isotropic materials these eigenvalues are ``3 lambda + 2 mu`` and ``2 mu``, and the measure is ``nu / (1 - 2 nu)``.
         """
-        normal = 2 if self.kinematics == "plane_stress" else 3
+        n_normal = 2 if self.kinematics == "plane_stress" else 3
         is_used = self.moduli[:, 0, 0] > 0.0  # unused rows of varying materials are zero
-        eigenvalues = np.linalg.eigvalsh(self.moduli[is_used, :normal, :normal])
+        eigenvalues = np.linalg.eigvalsh(self.moduli[is_used, :n_normal, :n_normal])
         return max(1.0, float(((eigenvalues[:, -1] / eigenvalues[:, 0]).max() - 1.0) / 3.0))
 
     @cached_property
@@ -203,8 +203,8 @@ def material_field(
         if material.varies_inside:
             N = elements.get(name).tables[0]
             rows_at_points.setdefault(name, np.repeat(rows[name][:, None], len(N), axis=1))
-            at_points = add(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
-            rows_at_points[name][cells] = at_points.reshape(len(cells), len(N))
+            new_rows = add(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
+            rows_at_points[name][cells] = new_rows.reshape(len(cells), len(N))
     all_moduli, owners = np.concatenate(moduli), np.concatenate(owner)
     numbers = dict(material_numbers)
     return MaterialField(materials, kinematics, all_moduli, evaluations, owners, numbers, rows, rows_at_points)

@@ -83,7 +83,8 @@ def nodal_stress_of_materials(
         Stress of each material at interfaces.
     """
     stress, values = separated[:n_points].copy(), separated[sides.slot]
-    order = np.lexsort((recovery.von_mises(values), sides.points))  # the last row of each node has the largest
+    # The last row of each node has the largest von Mises stress.
+    order = np.lexsort((recovery.von_mises(values), sides.points))
     stress[sides.points[order]] = values[order]
     return stress, MaterialStress(cells, sides.points, sides.material, values)
 
@@ -176,7 +177,7 @@ class ContactResult(NameSuggestions):
         in finite strain in the deformed configuration. In 3D, pairs of a closed and an open node with a common facet are
         considered; the lower bound is the smallest distance of their closed nodes and the upper bound the largest distance of
         their open nodes, so that all semi-axes of an elliptic contact lie between the bounds. If the contact is a ring around
-        an open middle, the bounds refer to its outer edge. The upper bound is infinite if the side is closed to its end.
+        an open middle, the bounds refer to its outer edge. The upper bound is infinite if the side is closed up to its edge.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)
@@ -219,7 +220,8 @@ class ContactResult(NameSuggestions):
     slip, slip_total : ndarray (m, dim)
         Tangential displacement of closed nodes relative to the opposite side, in this step and accumulated over all steps
         [length]. Where friction is solved in increments, slip is measured from the instant at which a node closes. At open
-        and at sticking nodes `slip` is zero. Both arrays are NaN if a version that did not store them wrote the result file.
+        and at sticking nodes `slip` is zero. Both arrays are NaN if the result file was written by a version that did not
+        store them.
     primary_points : ndarray of int (k,)
         Point numbers of the nodes of the primary side; empty for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
@@ -346,7 +348,7 @@ class ContactResult(NameSuggestions):
         """Whether forces are per unit thickness, as in plane models."""
         if self.coordinates.shape[1] == 3 or self.measured_from_axis:
             return False
-        # In axisymmetry the resultant has no radial component, but the nodal forces have.
+        # In axisymmetry the resultant has no radial component, but the nodal forces do.
         force_x, size = float(self.force_vectors[:, 0].sum()), float(np.abs(self.force_vectors).sum())
         return bool(abs(self.force[0] - force_x) <= 1e-9 * size and size > 0.0)
 
@@ -564,8 +566,8 @@ class StepResult(NameSuggestions):
           changes of the gap by `clearance_ramp`.
         - ``friction_work``: work dissipated by friction.
         - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which their
-          gaps close, unless they take over the forces of other nodes, and in the step in which a contact is lost. It is
-          overestimated in long steps.
+          gaps close, unless they take over the forces of other nodes, and by pairs in the step in which all their nodes
+          open. In long steps, this part is overestimated.
         - ``penalty_energy``: energy of penalties and cohesive layers, and of the small compliance of pressure fields.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
         - ``wear_work``: work of contact pressures on the wear depth, by which bodies approach each other.
@@ -699,7 +701,7 @@ def phases(shape: StepResult, count: int) -> list[StepResult]:
             shape, index=k + 1, load_factor=k / count, displacement=factor * shape.displacement,
             stress=factor * shape.stress, von_mises=abs(factor) * shape.von_mises,
             von_mises_signed=factor * shape.von_mises_signed, reaction=factor * shape.reaction,
-            contact={},  # contact only pushes and does not vibrate
+            contact={},  # contact results are not part of a vibration mode
             material_stress=None if materials is None else replace(materials, stress=factor * materials.stress),
             restart=None, iterations={"parameter": "phase"},
         )

@@ -1,8 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Polygon clipping of facets in 3D, in the plane of the secondary facet, and integration over the clipped polygon.
 
-A facet is a polynomial with coefficients ``terms`` (n_terms, 3) of the terms in `contact.search.facet_tables`. Its corners
-form the polygon that is clipped, in the ``axes`` (3, 3) of its plane, which are two tangents and the unit normal.
+A facet is a polynomial of its reference coordinates, with coefficients (n_terms, 3) of the terms in
+`contact.search.facet_tables`. In kernels, ``terms`` (n_terms, 3) contains the values of these terms at a point, and their
+derivatives. The polygon of the corners of a facet is clipped in a plane with the ``axes`` (3, 3): two tangents and the unit
+normal.
 """
 
 import numpy as np
@@ -20,8 +22,9 @@ def planes(corners, n_corners, origin, axes):
         _plane(corners[i], n_corners, origin[i], axes[i])
 
 
-# This function is inlined, since the process that compiles a separate kernel runs another copy than later processes, in
-# which products and sums may be fused differently. Tangents that differ in the last bit would change all contact results.
+# This function is inlined. Of a separate kernel, the process that compiles it and later processes, which load it from the
+# cache, would run different copies, in which products and sums may be fused differently. Tangents that differ in the last
+# bit would change all contact results.
 @innermost_kernel
 def _plane(corners, count, origin, axes):
     origin[:] = 0.0
@@ -52,13 +55,13 @@ def _plane(corners, count, origin, axes):
 
 
 @kernel
-def _flatten(points, count, shifted, origin, axes, flat):
-    """Fill `flat` (count, 2) with the coordinates of `points` in a plane, the first `shifted` ones relative to its origin."""
+def _flatten(points, count, n_positions, origin, axes, flat):
+    """Fill `flat` (count, 2) with `points` in plane coordinates: the first `n_positions` are positions, the rest vectors."""
     for k in range(count):
         for a in range(2):
             flat[k, a] = 0.0
             for d in range(3):
-                shift = origin[d] if k < shifted else 0.0
+                shift = origin[d] if k < n_positions else 0.0
                 flat[k, a] += (points[k, d] - shift) * axes[a, d]
 
 
@@ -87,11 +90,11 @@ def _centroid(flat, count):
 
 
 @kernel
-def _clip(subject, count, window, n_window, spare, least):
+def _clip(subject, count, window, n_window, spare, tolerance):
     """Clip `subject` in place by a convex, counter-clockwise `window` (Sutherland and Hodgman); return its number of corners.
 
-    Corners lie on a line of the window if their triangle with it has at most the area `least`. Without this tolerance, nearly
-    coincident lines would intersect at points that depend on round-off.
+    A corner is taken to lie on a side of the window if the parallelogram that they span has at most the area `tolerance`.
+    Otherwise, nearly coincident sides would intersect at points that depend on round-off.
     """
     for w in range(n_window):
         ax, ay = window[w, 0], window[w, 1]
@@ -101,8 +104,8 @@ def _clip(subject, count, window, n_window, spare, least):
             m = (k + 1) % count
             this_side = (bx - ax) * (subject[k, 1] - ay) - (by - ay) * (subject[k, 0] - ax)
             next_side = (bx - ax) * (subject[m, 1] - ay) - (by - ay) * (subject[m, 0] - ax)
-            this_side = this_side if abs(this_side) > least else 0.0
-            next_side = next_side if abs(next_side) > least else 0.0
+            this_side = this_side if abs(this_side) > tolerance else 0.0
+            next_side = next_side if abs(next_side) > tolerance else 0.0
             if this_side >= 0.0:
                 spare[n_kept, 0], spare[n_kept, 1] = subject[k, 0], subject[k, 1]
                 n_kept += 1
@@ -120,41 +123,42 @@ def _clip(subject, count, window, n_window, spare, least):
 
 
 @kernel
-def _overlap(corners, count, others, n_others, origin, axes, subject, window, spare):
+def _overlap(corners, count, other_corners, n_other, origin, axes, subject, window, spare):
     """Fill `subject` with the overlap of two polygons; return its number of corners, 0 for none."""
     _flatten(corners, count, count, origin, axes, subject)
-    least = ROUND_OFF * _area(subject, count)
-    _flatten(others, n_others, n_others, origin, axes, spare)
-    for k in range(n_others):  # facets that face each other have opposite orientations
-        window[k, 0], window[k, 1] = spare[n_others - 1 - k, 0], spare[n_others - 1 - k, 1]
-    count = _clip(subject, count, window, n_others, spare, least)
-    if count < 3 or _area(subject, count) <= least:
+    tolerance = ROUND_OFF * _area(subject, count)
+    _flatten(other_corners, n_other, n_other, origin, axes, spare)
+    for k in range(n_other):  # facets that face each other have opposite orientations
+        window[k, 0], window[k, 1] = spare[n_other - 1 - k, 0], spare[n_other - 1 - k, 1]
+    count = _clip(subject, count, window, n_other, spare, tolerance)
+    if count < 3 or _area(subject, count) <= tolerance:
         return 0
     return count
 
 
 @kernel
 def _may_intersect(low, high, origin, normal, radius, reach):
-    """Return whether a box may intersect the cylinder of `radius` and length 2 `reach` around a normal.
+    """Return whether a box may intersect a cylinder with the given `radius` and the length 2 `reach`.
 
-    The result is False for an empty box.
+    The axis of the cylinder is the `normal` through its centre `origin`. The result is False for an empty box.
     """
     if low[0] > high[0]:
         return False
-    square, along, size = 0.0, 0.0, 0.0
+    squared_distance, along, half_diagonal = 0.0, 0.0, 0.0
     for d in range(3):
         offset = 0.5 * (low[d] + high[d]) - origin[d]
         along += offset * normal[d]
-        square += offset * offset
-        size += 0.25 * ((high[d] - low[d]) * (high[d] - low[d]))
-    size = np.sqrt(size)
-    return abs(along) <= reach + size and square - along * along <= (radius + size) * (radius + size)
+        squared_distance += offset * offset
+        half_diagonal += 0.25 * ((high[d] - low[d]) * (high[d] - low[d]))
+    half_diagonal = np.sqrt(half_diagonal)
+    return abs(along) <= reach + half_diagonal and squared_distance - along * along <= (radius + half_diagonal) ** 2
 
 
 @interpretable_kernel
 def facing_pairs(
-    secondary, n_secondary, origin, axes, radius, reach, primary, n_primary, other_normal, numbers, tree, facing, pairs
-):
+    secondary, n_secondary, origin, axes, radius, reach, primary, n_primary, other_normal, numbers, tree,
+    max_cosine, pairs,
+):  # fmt: skip
     """Find the primary polygons that lie above or below each secondary polygon and face it.
 
     Parameters
@@ -171,8 +175,8 @@ def facing_pairs(
         Unit normals of the primary facets.
     numbers, tree : (n_facets,), Tree
         The primary facets in the order of their tree.
-    facing : float
-        Largest cosine between the normals of facets that face each other, e.g. -0.1.
+    max_cosine : float
+        Largest cosine of the angle between the normals of facets that face each other, e.g. -0.1.
     pairs : (capacity, 2)
         Filled with the numbers of the secondary and the primary facet, ascending in the former.
 
@@ -183,7 +187,7 @@ def facing_pairs(
     """
     capacity = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
     subject, window, spare = np.empty((capacity, 2)), np.empty((capacity, 2)), np.empty((capacity, 2))
-    stack, leaves, count = np.empty(DEPTH, np.int64), len(tree.low) // 2, 0
+    stack, n_leaves, count = np.empty(DEPTH, np.int64), len(tree.low) // 2, 0
     for s in range(secondary.shape[0]):
         normal = axes[s, 2]
         stack[0], top = 1, 1
@@ -192,13 +196,13 @@ def facing_pairs(
             box = stack[top]
             if not _may_intersect(tree.low[box], tree.high[box], origin[s], normal, radius[s], reach[s]):
                 continue
-            if box < leaves:
+            if box < n_leaves:
                 stack[top], stack[top + 1] = 2 * box, 2 * box + 1
                 top += 2
                 continue
-            p = numbers[box - leaves]
+            p = numbers[box - n_leaves]
             cosine = normal[0] * other_normal[p, 0] + normal[1] * other_normal[p, 1] + normal[2] * other_normal[p, 2]
-            if cosine <= facing and _overlap(
+            if cosine <= max_cosine and _overlap(
                 secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare
             ):
                 if count < pairs.shape[0]:
@@ -293,13 +297,13 @@ def _add_products(area, shape, other_shape, mass, coupling, i):
 
 
 @innermost_kernel
-def _height(powers, xi):
-    """Return a polynomial with coefficients (k, k) of the powers of both reference coordinates (2,)."""
+def _height(coefficients, xi):
+    """Return the value at `xi` (2,) of a polynomial with coefficients (k, k) of the powers of both reference coordinates."""
     height = 0.0
-    for i in range(powers.shape[0] - 1, -1, -1):
+    for i in range(coefficients.shape[0] - 1, -1, -1):
         row = 0.0
-        for j in range(powers.shape[1] - 1, -1, -1):
-            row = row * xi[1] + powers[i, j]
+        for j in range(coefficients.shape[1] - 1, -1, -1):
+            row = row * xi[1] + coefficients[i, j]
         height = height * xi[0] + row
     return height
 
@@ -321,10 +325,10 @@ def integrate(
 ):  # fmt: skip
     """Integrate products of shape functions over the segments of the secondary facets `low` to ``high - 1``.
 
-    Both facets are projected along the normal of the secondary polygon. Areas are those of the reference surface. Segments
-    are divided into triangles around their centres. The quadrature is exact between flat triangles. On other facets it has an
-    error. Because of the centres, this error does not depend on the choice of a first corner, and does not jump where corners
-    appear or vanish.
+    Both facets are projected along the normal of the secondary polygon. Areas are those of the reference surface. The
+    quadrature is exact between flat triangles. Segments of other facets are divided into triangles around their centroids, so
+    that the quadrature error does not depend on the choice of a first corner, and does not jump where corners appear or
+    vanish.
 
     Parameters
     ----------
@@ -334,9 +338,9 @@ def integrate(
     secondary, n_secondary, origin, axes, primary, n_primary
         Polygons and planes, as for `facing_pairs`.
     deformed, reference : (n_facets, n_terms, 3)
-        Terms of the secondary facets in both configurations [length].
+        Coefficients of the secondary facets in both configurations [length].
     to_terms : (n_terms, n_nodes)
-        Matrix from nodal values to terms.
+        Matrix from nodal values to coefficients.
     middle : (2,)
         Initial guess of reference coordinates.
     other_deformed, other_to_terms, other_middle
@@ -346,7 +350,7 @@ def integrate(
     points, weights : (n_q, 2), (n_q,)
         Quadrature rule on the triangle.
     heights, other_heights : (n_facets, k, k)
-        Heights of the smooth surfaces of both sides; k is 0 without smoothing [length].
+        Coefficients of the heights of the smooth surfaces of both sides; k is 0 without smoothing [length].
     factor : (n_pairs, 2)
         Factors of the heights of both sides.
     mass : (n_pairs, n_nodes, n_nodes)

@@ -24,7 +24,7 @@ def tree_and_counts(start: Numbers, rows: Numbers, parent: Numbers, count: Numbe
     The entries of row i of the factor are in the columns on the paths in the tree from the entries of row i of A to i (Davis,
     2006, section 4.5). The number of entries of a column includes the diagonal.
     """
-    visited = np.empty(len(parent), np.int32)  # the last row whose paths contain a column
+    visited = np.empty(len(parent), np.int32)  # for each column, the last row whose paths contain it
     for i in range(len(parent)):
         parent[i], count[i], visited[i] = -1, 1, i
         for k in range(start[i], start[i + 1]):
@@ -38,19 +38,19 @@ def tree_and_counts(start: Numbers, rows: Numbers, parent: Numbers, count: Numbe
 
 
 @interpretable_kernel
-def postordered(parent: Numbers, position: Numbers) -> None:
+def postorder_positions(parent: Numbers, position: Numbers) -> None:
     """Fill `position` (n,) with positions in a postorder: the columns of each subtree are contiguous, with its root last."""
     n = len(parent)
-    # Columns of a subtree without a position will be placed before `end` of its root. The last entry is for the roots.
+    # Columns of a subtree that have no position yet get positions below `end` of its root. The last entry is for the roots.
     size, end = np.ones(n, np.int32), np.empty(n + 1, np.int32)
     for j in range(n):
         if parent[j] != -1:
             size[parent[j]] += size[j]
     end[n] = n
     for j in range(n - 1, -1, -1):
-        parent_or_end = parent[j] if parent[j] != -1 else n
-        position[j] = end[j] = end[parent_or_end] - 1
-        end[parent_or_end] -= size[j]
+        parent_or_n = parent[j] if parent[j] != -1 else n
+        position[j] = end[j] = end[parent_or_n] - 1
+        end[parent_or_n] -= size[j]
 
 
 @interpretable_kernel
@@ -73,7 +73,7 @@ def supernodes(
         The first column of each supernode, followed by n, and the number of rows below each supernode; filled here.
     """
     n, top = len(parent), -1
-    entries = np.empty(n, np.int64)
+    entries = np.empty(n, np.int64)  # of each supernode, without explicit zeros
     for j in range(n + 1):
         connected = 0 < j < n and parent[j - 1] == j and count[j - 1] == count[j] + 1 and marked[j - 1] == marked[j]
         if not connected:
@@ -120,7 +120,7 @@ def rows_below(
     column ``order[k]`` of the matrix, and `position` is the inverse of `order`.
     """
     n, count = len(order), len(first) - 1
-    supernode_of, last_row, at = np.empty(n, np.int32), np.full(count, -1, np.int32), row_start[:count].copy()
+    supernode_of, last_row, next_entry = np.empty(n, np.int32), np.full(count, -1, np.int32), row_start[:count].copy()
     for s in range(count):
         supernode_of[first[s] : first[s + 1]] = s
     for i in range(n):
@@ -132,6 +132,6 @@ def rows_below(
             s = supernode_of[j]
             while s != supernode_of[i] and last_row[s] != i:
                 last_row[s] = i
-                row_indices[at[s]] = i
-                at[s] += 1
+                row_indices[next_entry[s]] = i
+                next_entry[s] += 1
                 s = supernode_of[parent[first[s + 1] - 1]]

@@ -215,7 +215,7 @@ def elimination_tree(A: csc_array) -> Tree:
     n = A.shape[0]
     parent, count, position, order = (np.empty(n, np.intc) for _ in range(4))
     elimination_tree_kernels.tree_and_counts(A.indptr, A.indices, parent, count)
-    elimination_tree_kernels.postordered(parent, position)
+    elimination_tree_kernels.postorder_positions(parent, position)
     order[position] = np.arange(n, dtype=np.intc)
     ordered_parent = parent[order]
     return Tree(order, position, np.where(ordered_parent < 0, np.intc(-1), position[ordered_parent]), count[order])

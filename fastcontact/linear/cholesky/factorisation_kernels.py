@@ -99,7 +99,7 @@ def factorise(
     ----------
     start, rows, values
         The matrix by columns, at least its lower triangle in the order of elimination. All other arguments are numbered in
-        the postorder of `elimination_tree_kernels.postordered`.
+        the postorder of `elimination_tree_kernels.postorder_positions`.
     order, position : ndarray of int (n,)
         Columns of the matrix in the order of elimination, and the inverse.
     parent : ndarray of int (n,)

@@ -2,7 +2,7 @@
 
 With standard multipliers, weighted gaps are coupled by the mass matrix of the secondary surface, whose inverse is a full
 matrix. Its factors, however, are sparse, so that forward and back substitution cost little compared with a product with the
-stiffness matrix. Preconditioners require sparse weights. They use a sparse approximation of the inverse, with one block per
+stiffness matrix. Preconditioners require a sparse matrix. They use a sparse approximation of the inverse, with one block per
 node, that is exact for translations in the directions of the pivots of the node.
 
 A nearly singular matrix is detected by an estimate of its condition number, for which a few systems are solved (see

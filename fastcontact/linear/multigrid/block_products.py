@@ -1,11 +1,11 @@
 """Products of small blocks with vectors and with each other, implemented with vector instructions.
 
-The compiler translates a plain loop over the nine numbers of a 3 x 3 block into nine scalar products, because it cannot
-deduce that the positions given by an index array are contiguous. Here, a row of a block is processed by one vector
-instruction. This halves the time of a product with a matrix from 16.7 to 8.5 ns per unknown (single precision, 311 469
-unknowns, one thread). Plain compiled loops in place of the four functions increase the processor time of an analysis from
-2.5 to 3.1 s (sphere on a block, 28 833 unknowns, three steps). Plain loops in place of `add_product` and `add_transposed`
-alone increase it from 3.0 to 3.4 s to 3.7 to 4.4 s (279 447 unknowns, one step).
+The compiler translates a plain loop over the nine entries of a 3 x 3 block into nine scalar multiplications, because it
+cannot deduce that the positions given by an index array are contiguous. Here, a row of a block is processed by one vector
+instruction. This reduces the time of a matrix-vector product from 16.7 to 8.5 ns per unknown (single precision, 311 469
+unknowns, one thread). Plain compiled loops in place of the four functions increase the CPU time of an analysis from 2.5 to
+3.1 s (sphere on a block, 28 833 unknowns, three steps). Plain loops in place of `add_product` and `add_transposed` alone
+increase it from between 3.0 and 3.4 s to between 3.7 and 4.4 s (279 447 unknowns, one step).
 
 `block_products_llvm` generates the instructions. The functions `..._plain` are their equivalents in NumPy. They are used if
 kernels are not compiled, and in tests of the instructions. Indices are not checked.
@@ -34,12 +34,12 @@ def row_times_plain(
     indices : ndarray of int (n_blocks,)
         Block columns.
     entries : tuple of ndarray (n_blocks * m * n,)
-        The numbers of the blocks, one block after the other. They may be split, see `symmetric_storage_kernels`.
+        The entries of the blocks, one block after the other. They may be split, see `symmetric_storage_kernels`.
     x : ndarray (n_columns * n,)
     begin, end : int
         The blocks of the row are those from `begin` to ``end - 1``.
     rows, cols : tuple
-        Tuples of m and n zeros: the size of a block.
+        Tuples of m and n zeros, from whose types the compiler knows the size of a block.
     """
     m, n = len(rows), len(cols)
     positions = slice(begin * m * n, end * m * n)
@@ -57,7 +57,7 @@ def row_times_both_ways_plain(
 
     Parameters
     ----------
-    indices, numbers, x, begin, end
+    indices, entries, x, begin, end
         As in `row_times_plain`. The blocks are square, and no two of them are in the same column.
     row : int
         Number of the block row.
@@ -84,9 +84,9 @@ def add_product_plain(
     out : ndarray, start : int
         Array that is changed in place, beginning at the position `start`.
     left : tuple of ndarray, left_start : int
-        Numbers of A (m, k), which may be split, and the position of the first one.
+        Entries of A (m, k), which may be split, and the position of the first one.
     right : ndarray, right_start : int
-        Numbers of B (k, n), and the position of the first one.
+        Entries of B (k, n), and the position of the first one.
     sizes : tuple of tuples
         Tuples of m, k and n zeros.
     """

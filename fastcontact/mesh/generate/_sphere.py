@@ -125,22 +125,22 @@ def sphere_octant(
     spacing = _spacing(R, size, contact_size, contact_radius, growth)
     eighth = math.pi / 4
     angles = graded_positions(R * eighth, spacing) / R
-    outward = 1.0 - graded_positions((1.0 - INNER) * R, _depth_spacing(spacing))[::-1] / ((1.0 - INNER) * R)
-    upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
+    radial_lines = 1.0 - graded_positions((1.0 - INNER) * R, _depth_spacing(spacing))[::-1] / ((1.0 - INNER) * R)
+    vertical_lines = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
 
     def map_of_block(face: int) -> Map:
         """Return the map of the inner block for ``face = -1``, otherwise of the block at its face number `face`."""
 
         def place(*parameters: Array) -> Array:
             coordinates = np.column_stack(parameters)
-            depth = np.zeros(len(coordinates)) if face < 0 else coordinates[:, face].copy()
+            outward = np.zeros(len(coordinates)) if face < 0 else coordinates[:, face].copy()  # 1 on the sphere
             if face >= 0:
                 coordinates[:, face] = eighth
             cube = np.tan(coordinates)
             length = np.linalg.norm(cube, axis=1, keepdims=True)
             direction = np.divide(cube, length, out=np.zeros_like(cube), where=length > 0)
             rounded = (1.0 - BULGE) * cube + BULGE * _to_ball(cube)
-            x, z, down = (R * ((1.0 - depth[:, None]) * INNER * rounded + depth[:, None] * direction)).T
+            x, z, down = (R * ((1.0 - outward[:, None]) * INNER * rounded + outward[:, None] * direction)).T
             return np.column_stack([x, R - down, z])
 
         return place
@@ -149,10 +149,10 @@ def sphere_octant(
     grids = {-1: {}, 0: {"XMAX": "SPHERE_SIDE"}, 1: {"YMAX": "SPHERE_SIDE"}, 2: {"ZMAX": "CONT_SPHERE"}}
     blocks = []
     for face, outer in grids.items():
-        grid = [angles, angles, upward]
+        grid = [angles, angles, vertical_lines]
         names_of_block = dict(names)
         if face >= 0:
-            grid[face] = outward
+            grid[face] = radial_lines
             del names_of_block[("XMIN", "YMIN", "ZMIN")[face]]
         blocks.append(_mapped_box(element, grid, map_of_block(face), "SPHERE", names_of_block | outer))
     mesh = merge_points(union(*blocks), 1e-6 * R * float(np.diff(angles).min()))

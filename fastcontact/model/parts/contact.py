@@ -86,7 +86,7 @@ class ModelContact(ModelConnections):
             - ``clearance_ramp``: history of both clearances, as pairs (instant, multiplier); by default they are constant.
             - ``friction_ramp``: history of the coefficient of friction, as pairs (instant, multiplier).
             - ``surface_smoothing``: whether gaps are measured between the smooth surfaces that facets of curved sides
-              approximate; by default, except for node-to-segment contact and at rigid obstacles.
+              approximate; True by default, except for node-to-segment contact and at rigid obstacles.
             - ``excluded``: groups whose nodes carry no contact pressure. In the node-to-segment formulation and in mortar
               contact with one gap per node, the tributary areas of these nodes carry no pressure; in the other
               formulations, integration points whose nearest node is excluded carry none. The two sides may share excluded
@@ -400,33 +400,33 @@ class ModelContact(ModelConnections):
             check_repeated_facets(self.mesh, pair, earlier_pair)
         self.contact.append(pair)
 
-    def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
+    def bind(self, pair: ContactPair, motions: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh. Raises the errors of `add_contact`.
 
-        `held` contains the nodal motions that supports and multi-point constraints prescribe, if they are known.
+        `motions` contains the nodal motions that supports and multi-point constraints prescribe, if they are known.
         `sectors_alike` states whether pressures are equal at both ends of a sector. This holds in static analyses, but not
         necessarily in vibration modes.
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
-        kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
-        available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in common)]
-        available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
+        variant = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
+        no_options = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
+        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(variant) if f.init and f.name not in no_options)]
+        known += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
-            check_known(f"option of {pair.formulation}", option, available, ContactError)
-        specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
-        check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
-        unit = np.eye(self.mesh.dim)
-        ends = [(i.first, i.second, unit if i.turn is None else i.turn) for i in self.periodic_interfaces]
+            check_known(f"option of {pair.formulation}", option, known, ContactError)
+        own_options = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
+        check_fields(f"contact '{pair.name}'", own_options, variant, ContactError)
+        identity = np.eye(self.mesh.dim)
+        ends = [(i.first, i.second, identity if i.turn is None else i.turn) for i in self.periodic_interfaces]
         secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
         has_obstacle = pair.obstacle is not None
         options = pair_options(pair.name, pair.options, self.mesh, secondary, has_obstacle)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
-            if not kind.allows_obstacles:
+            if not variant.allows_obstacles:
                 raise ContactError(f"contact '{pair.name}': mortar in 2D needs multipliers='dual' at an obstacle")
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
-            specific.setdefault("surface_smoothing", False)
+            own_options.setdefault("surface_smoothing", False)
         else:
             primary = surface(self.mesh, pair.primary).with_periodic_ends(ends)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
@@ -440,4 +440,4 @@ class ModelContact(ModelConnections):
             source=self._fluid_source(pair, secondary, options),
         )  # fmt: skip
         sides = secondary, primary, self.mesh.points
-        return kind(*sides, axisymmetric, modulus, options=options, held_motions=held, **specific)
+        return variant(*sides, axisymmetric, modulus, options=options, held_motions=motions, **own_options)
