@@ -235,7 +235,7 @@ def test_facets_that_deviate_from_a_rigid_shape_are_reported_after_unloading():
     ring = strip.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
     model = elastic_model(ring, BOTTOM="y", TOP="x")
     shaft = fc.obstacles.Sphere((0.0, 0.0), 20.0)
-    ramp = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]
+    ramp = [(0.0, 0.0), (1.0, 1.0), (2.0, -1.0)]
     model.add_obstacle("shaft", secondary="LEFT", obstacle=shaft, clearance=-0.08, clearance_ramp=ramp)
     with pytest.warns(fc.FastcontactWarning, match="in load step 1, .* facets of 'LEFT' .* deviate from their arcs"):
         fc.solve(model, [1.0, 2.0])
