@@ -13,8 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.analysis.criteria import NOTABLE
-from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
@@ -25,7 +23,7 @@ from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.mesh import elements, quadrature
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.step import ContactResult
 from fastcontact.round_off import TINY
 
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
@@ -38,20 +36,17 @@ RELATIVE_ERROR_LIMIT_AT_RIGID_SHAPES = 0.05
 MEAN_GAP_FACTOR = 2.0
 
 
-def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
-    """Return, by name, a warning for each pair with a large pressure error due to sag in the `last` step."""
-    warnings, load, displacement = {}, problem.load_at(last.load_factor), problem.displacement(state.u)
-    for name, pair in problem.pairs.items():
-        contact = last.contact[name]
-        corrected = pair.smoothing is not None or not isinstance(pair.normals, str)
-        if corrected or pair.options.kind in ("tied", "gap_only") or not (contact.pressure > 0.0).any():
-            continue
-        configuration = problem.configuration(name, state, load, displacement, state.u)
-        text = _warning(pair, *_sag(pair, configuration, contact.active), contact)
-        text = text or _inclination(pair, configuration, contact)
-        if text:
-            warnings[name] = f"contact '{name}': {text}"
-    return warnings
+def sag_warning(pair: Formulation, configuration: Configuration, contact: ContactResult) -> list[str]:
+    """Return a warning if the pressure error of a pair due to sag is large in a step, otherwise an empty list.
+
+    `configuration` and `contact` are the configuration and the result of the pair at the end of the step.
+    """
+    corrected = pair.smoothing is not None or not isinstance(pair.normals, str)
+    if corrected or pair.options.kind in ("tied", "gap_only") or not (contact.pressure > 0.0).any():
+        return []
+    text = _warning(pair, *_sag(pair, configuration, contact.active), contact)
+    text = text or _inclination(pair, configuration, contact)
+    return [f"contact '{contact.name}': {text}"] if text else []
 
 
 def _warning(pair: Formulation, spread: float, slope: float, contact: ContactResult) -> str:

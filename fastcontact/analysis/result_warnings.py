@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import dijkstra
 
+from fastcontact._tools.records import replace
 from fastcontact.analysis.criteria import NOTABLE, WARNING_RATIO, Criteria
-from fastcontact.analysis.facet_sag import facet_length, sag_warnings
+from fastcontact.analysis.facet_sag import facet_length, sag_warning
 from fastcontact.analysis.interpenetration import Peak, interpenetration
 from fastcontact.analysis.kinematics_warnings import large_rotation, large_strain
 from fastcontact.analysis.locking import ALTERNATING, locking_warnings
@@ -22,7 +23,7 @@ from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
-from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
@@ -79,7 +80,6 @@ def result_warnings(
     load = problem.load_at(last.load_factor)
     rises = load.rise, state.rise  # by prescribed temperatures of nonlinear bodies, and by heat conduction
     loaded = any(values is not None and values.any() for values in (load.force, load.lift, *rises))
-    sag = sag_warnings(problem, state, last)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.kind == "gap_only":
@@ -88,21 +88,34 @@ def result_warnings(
         undetermined = _undetermined_tractions(pair, contact, pair.nodes_with_undetermined_traction(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *_open_contact(problem, state, name, last, loaded)]
         warnings += undetermined
-        unresolved = list(_coarse_contact(pair, contact, state))
-        if name in sag and not (unresolved and isinstance(pair.primary, RigidSide)):  # refinement also reduces the sag
-            unresolved = [sag[name]]
+        unresolved = _unresolved(pair, configuration, contact, state)
         oscillation = list(pressure_oscillation(pair, contact, problem.model))
         oscillation = oscillation or list(_quadrature_error(pair, configuration, contact, problem.model))
         pressures = [*unresolved, *oscillation]
-        index, _, contacts = peaks[name]
+        index, displacement, contacts = peaks[name]
         if not pressures and index != last.index:
             peak = contacts[name]
-            texts = [*_coarse_contact(pair, peak, state), *pressure_oscillation(pair, peak, problem.model)]
+            at_peak = replace(Configuration.displaced(displacement), pose=_pose(peak))
+            texts = [*_unresolved(pair, at_peak, peak, state), *pressure_oscillation(pair, peak, problem.model)]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += [*pressures, *_pressure_peak_at_edge(pair, last, contact), *_sliding_past_ends(pair, contact)]
         warnings += _excessive_wear(name, pair, state)
     warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_energy_imbalance(state)]
     return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]
+
+
+def _unresolved(pair: Formulation, configuration: Configuration, contact: ContactResult, state: State) -> list[str]:
+    """Return the warnings about few facets in contact, or about facets that deviate from curved surfaces."""
+    coarse, sag = list(_coarse_contact(pair, contact, state)), sag_warning(pair, configuration, contact)
+    # Against rigid shapes, refinement also reduces the sag.
+    return coarse if coarse and isinstance(pair.primary, RigidSide) else sag or coarse
+
+
+def _pose(contact: ContactResult) -> Pose:
+    """Return the displacement and the rotation of the rigid obstacle of a contact at the end of a step."""
+    still = np.zeros(contact.coordinates.shape[1])
+    displacement = contact.obstacle_displacement
+    return Pose(still if displacement is None else displacement, contact.obstacle_angle or 0.0)
 
 
 def _sliding_past_ends(pair: Formulation, contact: ContactResult) -> Iterator[str]:

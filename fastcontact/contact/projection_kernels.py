@@ -8,7 +8,7 @@ in `search.facet_tables`; facets with fewer than m nodes have zeros at the end.
 import numpy as np
 
 from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.limits import LARGEST_OVERHANG, MAX_ITERATIONS, STEP
+from fastcontact.contact.search.limits import LARGEST_OVERHANG, MAX_ITERATIONS, ROUND_OFF_STEP, STEP
 from fastcontact.contact.search.projection_3d_kernels import component, vector
 from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, plus_multiple, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
@@ -76,6 +76,7 @@ def _newton(point, terms, directions, f, s, t, height):
 
     X is the position and n the interpolated normal. The arguments (s, t) and `height` are the initial guess.
     """
+    step = np.inf
     for _ in range(MAX_ITERATIONS):
         foot, along_s, along_t = _interpolated(terms, f, s, t)
         normal, turn_s, turn_t = _interpolated(directions, f, s, t)
@@ -91,9 +92,10 @@ def _newton(point, terms, directions, f, s, t, height):
         # Far from the solution, a full step may leave the region where the interpolated normals are meaningful.
         damping = 1.0 if size <= 1.0 else 1.0 / size
         s, t, height = s + damping * ds, t + damping * dt, height + damping * dh
-        if damping * size <= STEP * (1.0 + max(abs(s), abs(t))):
+        step = damping * size / (1.0 + max(abs(s), abs(t)))
+        if step <= STEP:
             return s, t, True
-    return s, t, False
+    return s, t, step <= ROUND_OFF_STEP
 
 
 @innermost_kernel

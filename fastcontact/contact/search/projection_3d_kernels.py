@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.search.limits import MAX_ITERATIONS, STEP
+from fastcontact.contact.search.limits import MAX_ITERATIONS, ROUND_OFF_STEP, STEP
 from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, on_flat, residual, unit
 from fastcontact.round_off import ROUND_OFF
 
@@ -191,6 +191,7 @@ def descend(terms, f, s, t, sides, point):
     Newton's method minimises the squared distance over the polygon of the reference domain. It is an active-set method that
     continues along a side once it has reached this side, and that never increases the distance.
     """
+    size = np.inf
     for _ in range(MAX_ITERATIONS):
         value, gs, gt, hss, hst, htt = _expansion(terms, f, s, t, point)
         ps, pt = _newton_step(sides, s, t, gs, gt, hss, hst, htt)
@@ -213,7 +214,7 @@ def descend(terms, f, s, t, sides, point):
                     break
                 length *= 0.5
         s, t = s + length * ps, t + length * pt
-    return s, t, False
+    return s, t, size <= ROUND_OFF_STEP
 
 
 @kernel

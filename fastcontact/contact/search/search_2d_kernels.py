@@ -8,7 +8,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
-from fastcontact.contact.search.limits import LARGEST_OVERHANG, MAX_ITERATIONS, STEP
+from fastcontact.contact.search.limits import LARGEST_OVERHANG, MAX_ITERATIONS, ROUND_OFF_STEP, STEP
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
@@ -151,7 +151,7 @@ def _newton(x, y, corners, normals, f, s):
             return s, False
         if abs(step) <= STEP * (1.0 + abs(s)):
             return s, True
-    return s, abs(step) <= 1e-10
+    return s, abs(step) <= ROUND_OFF_STEP
 
 
 @interpretable_kernel

@@ -356,3 +356,20 @@ def test_what_cannot_be_projected_is_told():
     refused(ContactError, "1 projected points are not finite", closest, np.vstack([points, [np.nan, 0, 0]]), corners)
     refused(ContactError, r"did not converge .* folded or collapsed", closest, points, np.ones((1, 4, 3)))
     refused(ContactError, r"no facets of 5 nodes .* \[3, 4, 6, 8, 9\]", closest, points, np.ones((1, 5, 3)))
+
+
+def test_short_facets_of_a_wide_surface_are_projected_on():
+    """Round-off of coordinates near 1000, over facets 0.3 wide, exceeds the tolerance of Newton's method."""
+    y, slope = (7.885176925015513, 17.85236330491464), (-1.1197208691274295e-05, -4.761778277224221e-06)
+    corners = [
+        [y[0], 0.0, slope[0]],
+        [y[1], 0.0, slope[1]],
+        [y[1], 0.3342327, -4.761319e-06],
+        [y[0], 0.3342326, -1.11916e-05],
+    ]
+    far = np.array([[999.0, 999.0, 0.0], [1000.0, 999.0, 0.0], [1000.0, 1000.0, 0.0], [999.0, 1000.0, -2.4e-4]])
+    random = np.random.default_rng(0)
+    points = np.column_stack([random.uniform(9.0, 17.0, 2000), np.zeros(2000), random.uniform(0.02, 0.11, 2000)])
+    found, alone = closest(points, np.array([corners, far])), closest(points, np.array([corners]))
+    assert (found.facet == 0).all()
+    assert np.abs(found.xi - alone.xi).max() < 1e-9

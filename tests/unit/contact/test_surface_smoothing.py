@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import made_of, supported
+from models import elastic_model, made_of, supported
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
@@ -226,3 +226,16 @@ def test_facets_that_interlock_where_nodes_coincide_are_told(smooth):
     )  # fmt: skip
     last = fc.solve(model, [1.0, 2.0])[-1]
     assert any("inclined to the smooth surface" in text for text in last.warnings) != smooth
+
+
+def test_facets_that_deviate_from_a_rigid_shape_are_reported_after_unloading():
+    """Where bodies yield, the errors of the step with the largest force remain."""
+    strip = fc.generate.block((20.0, np.pi / 2), (3, 12), origin=(20.0, 0.0))
+    radius, angle = strip.points.T
+    ring = strip.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+    model = elastic_model(ring, BOTTOM="y", TOP="x")
+    shaft = fc.obstacles.Sphere((0.0, 0.0), 20.0)
+    ramp = [(0.0, 0.0), (1.0, 1.0), (2.0, -1.0)]
+    model.add_obstacle("shaft", secondary="LEFT", obstacle=shaft, clearance=-0.08, clearance_ramp=ramp)
+    with pytest.warns(fc.FastcontactWarning, match="in load step 1, .* facets of 'LEFT' .* deviate from their arcs"):
+        fc.solve(model, [1.0, 2.0])
