@@ -106,6 +106,12 @@ def test_field_is_in_equilibrium_and_follows_hooke(point, nu, kinematics):
     assert out_of_plane == pytest.approx(0.0, abs=1e-14 * scale)
 
 
+def test_far_stress_is_that_of_a_line_force(unit):
+    x, y, rho2 = 3e4, -4e4, 25e8
+    factor = 2.0 * unit.force * y / (math.pi * rho2**2)
+    np.testing.assert_allclose(unit.stress(x, y)[[0, 1, 3]], factor * np.array([x * x, y * y, x * y]), rtol=1e-7)
+
+
 def test_field_is_symmetric(unit):
     x, y = np.array([0.3, 2.0, 5.0]), np.array([0.0, -0.0, -1.0])
     np.testing.assert_allclose(unit.displacement(-x, y), unit.displacement(x, y) * [-1.0, 1.0], atol=1e-15)

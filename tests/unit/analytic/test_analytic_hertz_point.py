@@ -124,6 +124,15 @@ def test_field_is_in_equilibrium_and_follows_hooke(point, nu):
     assert u_r[1] + u_z[0] == pytest.approx(2.0 * (1.0 + nu) / E * rz, abs=1e-9 * scale)
 
 
+def test_far_field_is_that_of_a_point_force(unit):
+    r, z = 3e4, -4e4  # distance 5e4
+    F, nu, rho = unit.force, 0.3, 5e4
+    u_z = -(1.0 + nu) * F / (2.0 * math.pi) * (z**2 / rho**3 + 2.0 * (1.0 - nu) / rho)
+    zz = -3.0 * F * 4e4**3 / (2.0 * math.pi * rho**5)
+    assert unit.displacement(r, z)[1] == pytest.approx(u_z, rel=1e-7)
+    assert unit.stress(r, z)[1] == pytest.approx(zz, rel=1e-7)
+
+
 def test_displacement_is_zero_on_the_axis_and_finite_at_the_edge(unit):
     assert unit.displacement(0.0, -1.0)[0] == 0.0
     edge = unit.stress(unit.radius, 0.0)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from models import reference
 
 from fastcontact.analytic import (
+    hertz_line,
     persson_limit_angle,
     persson_pin,
     press_fit_cylinders,
@@ -129,6 +130,14 @@ def test_pin_and_plate_fit_over_the_contact(angle):
     scale = np.ptp(opening)
     assert fitted[0] == pytest.approx(pin.clearance, abs=1e-5 * scale)
     np.testing.assert_allclose(basis @ fitted, opening[inside], atol=1e-6 * scale)
+
+
+def test_light_load_is_hertz():
+    pin = persson_pin(E=1000.0, R=10.0, clearance=0.1, contact_angle=0.1)
+    relative = 10.0 * 9.9 / 0.1
+    line = hertz_line(E1=1000.0, nu1=0.0, E2=1000.0, R1=relative, force=pin.force)
+    assert line.half_width == pytest.approx(pin.radius, rel=0.01)  # R^2 or R (R - clearance): 1 % here
+    assert line.pressure_max == pytest.approx(pin.pressure_max, rel=0.01)
 
 
 def test_fit_without_clearance_has_one_angle():

@@ -228,6 +228,11 @@ def test_series_is_long_enough(ratio, load, monkeypatch):
     assert found.pressure_max == pytest.approx(longer.pressure_max, rel=2e-6)
 
 
+def test_wide_load_goes_straight_through():
+    contact = layer(0.5, 8.0)
+    np.testing.assert_allclose(contact.pressure([0.0, 2.0, 4.0]), 1.0 / 16.0, rtol=2e-3)
+
+
 def test_plane_strain_counts_with_plane_strain_moduli():
     strain = layer(2.0, 0.0, nu1=0.3, nu2=0.2, kinematics="plane_strain")
     stress = layer(2.0 * 0.96 / 0.91, 0.0)

@@ -166,6 +166,13 @@ def test_without_contact_there_is_nothing_to_condense_to(name):
     np.testing.assert_allclose(K @ solver.load(f).full_solution(np.zeros(len(f))), f, atol=1e-12)
 
 
+def test_forces_elsewhere_cost_a_solution():
+    K, _, solver = prepared()
+    force = np.random.default_rng(4).normal(size=K.shape[0])
+    u = solver.load(np.zeros(K.shape[0])).full_solution(force)
+    np.testing.assert_allclose(K @ u, force, atol=1e-12)
+
+
 @pytest.mark.parametrize("last", [True, False])
 def test_no_further_forces_cost_no_solution(last):
     K, _, solver = prepared(last=last)
