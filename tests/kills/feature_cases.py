@@ -80,6 +80,15 @@ CASES = {
     "friction ramp": _blocks(
         options="friction = 0.4\nfriction_ramp = [[0.0, 0.2], [0.5, 1.0], [1.0, 0.1]]", along=0.05
     ),
+    "tangential penalty": _blocks(options="friction = 0.3\ntangential_penalty = 1e3", along=0.05),
+    "wear": _blocks(options="wear = 1e-3", along=0.5),
+    "hot rubber": _blocks(
+        'law = "neo_hookean"\nE = 10.0\nnu = 0.45\nconductivity = 50.0\nexpansion = 1e-4',
+        "conductance = 5.0",
+        HOT,
+        'strain = "finite"\nreference_temperature = 20.0',
+        down=-0.3,
+    ),
     "temporary supports": CUBE + COMING + pressed("", 100.0),
 }
 

@@ -12,7 +12,6 @@ KERNEL_TESTS = (
     "tests/unit/analysis/test_coulomb.py",
     "tests/unit/linear/test_linear_multigrid.py",
     "tests/unit/linear/test_grouped_pivots.py",
-    "tests/unit/contact/test_box_tree.py",
     "tests/unit/contact/test_search.py",
     "tests/unit/linear/test_symmetric_factors.py",
 )

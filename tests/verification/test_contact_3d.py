@@ -1,7 +1,5 @@
 """Node-to-segment and continuous contact in three dimensions: patch tests, spheres, equilibrium, invariance."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 from models import elastic_model, supported
@@ -125,7 +123,6 @@ def measured(contact):
     return 4 * push.sum(), contact.pressure[np.argmin(contact.abscissa)], radius
 
 
-@cache
 def plate_contact(element, formulation, contact_size):
     """All sizes of the mesh but the finely meshed radius fall together; quadratic elements do with a coarser one."""
     sizes = {"size": 8.0 * contact_size, "contact_radius": 6.0, "growth": 0.2 * contact_size}
@@ -154,19 +151,6 @@ def test_a_sphere_on_a_rigid_plate_is_half_of_two_spheres(element, formulation, 
         assert value == pytest.approx(reference, rel=tolerance)
     inner, outer = contact.radius
     assert inner - contact_size < exact.radius < outer + contact_size
-
-
-@pytest.mark.parametrize("formulation", first_of(1, ["node_to_segment", "continuous"]))
-def test_errors_fall_with_the_mesh(formulation):
-    """Of force, pressure and radius together: each alone may pass through zero."""
-    exact = fc.analytic.finite_half_spheres(1.0)
-    reference = np.array([exact.force, exact.pressure_max, exact.radius])
-    errors = [
-        np.linalg.norm(np.array(measured(plate_contact("hex8", formulation, size))) / reference - 1)
-        for size in (2.8, 2.0, 1.4)
-    ]
-    assert errors[2] < errors[1] < errors[0]
-    assert errors[2] < 0.4 * errors[0]
 
 
 @pytest.mark.parametrize("swap", first_of(1, [False, True]))

@@ -458,18 +458,6 @@ def test_pressures_do_not_oscillate_in_large_steps(formulation):
     assert smooth.pressure == pytest.approx(np.full(21, FORCE / 2.0), rel=1e-4)
 
 
-def test_an_analysis_goes_on_with_what_was_worn_off(tmp_path):
-    model = shoe()
-    whole = fc.solve(model, [1.0, 2.0, 3.0, 4.0])
-    with fc.ResultWriter(tmp_path / "worn.vtkhdf", model) as out:
-        fc.solve(model, [1.0, 2.0, 3.0], on_step=out.write)
-    stored = list(fc.open_results(tmp_path / "worn.vtkhdf"))
-    assert (stored[-1].contact["sole"].wear == whole[2].contact["sole"].wear).all()
-    again = list(fc.solve_steps(model, [1.0, 2.0, 3.0, 4.0], resume=stored))
-    assert again[-1].contact["sole"].wear == pytest.approx(whole[-1].contact["sole"].wear, rel=1e-9)
-    assert again[-1].displacement == pytest.approx(whole[-1].displacement, abs=1e-12)
-
-
 def test_what_cannot_wear_is_refused():
     refused(fc.ContactError, "is bilateral, which does not wear", shoe, kind="bilateral")
     refused(fc.ContactError, r"wear = -1\.0 of contact 'sole' must be positive", shoe, wear=-1.0)

@@ -7,10 +7,7 @@ import pytest
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.cases.case import read_case
 
-# code_aster's meshes of the same letter, converged geometry (A, C: stress at C1; B: code_aster's multiplier).
-ON_CODE_ASTERS_MESH = {"a": 2773.57307445, "b": 2876.28674013, "c": 2928.76786014}
 FORCE, PRESSURE = 659_773.142, 2910.4071
 VON_MISES, DEPTH = 1738.4852, 5.645414
 
@@ -27,16 +24,6 @@ def test_the_shipped_meshes_are_those_of_the_generator(letter, root):
         assert np.array_equal(made.points_of(group), shipped.points_of(group))
 
 
-@pytest.mark.parametrize("letter", first_of(1, ["a", "b", "c"]))
-def test_default_meshes_are_within_two_percent_of_code_asters(letter, root):
-    case = read_case(root / f"data/cases/forma04{letter}.toml")
-    last = fc.solve(case.model, case.ramp)[-1]
-    point = case.probes["C1"]
-    contact = last.contact["hertz"]
-    found = contact.pressure[np.flatnonzero(contact.points == point)[0]] if letter == "b" else -last.stress[point, 1]
-    assert found == pytest.approx(ON_CODE_ASTERS_MESH[letter], rel=0.02)
-
-
 def test_refined_quadratic_mesh_reaches_the_mesh_converged_solution(forma04):
     mesh = fc.generate.half_spheres("quad8", arc_sizes=(0.15, 1.5), segments=24)
     model = forma04(mesh, "continuous")
@@ -51,22 +38,10 @@ def test_refined_quadratic_mesh_reaches_the_mesh_converged_solution(forma04):
     assert mesh.points[top] == pytest.approx([0.0, np.copysign(DEPTH, mesh.points[top, 1])], abs=0.3)
 
 
-def test_force_and_pressure_converge_with_the_mesh(forma04):
-    errors = []
-    for k in (1, 2, 4):
-        mesh = fc.generate.half_spheres("quad8", arc_sizes=(0.8 / k, 8.0 / k), segments=5 * k)
-        contact = fc.solve(forma04(mesh, "continuous"), fc.linear_ramp(1))[-1].contact["hertz"]
-        errors.append((abs(contact.force[1]) / FORCE - 1, contact.pressure[0] / PRESSURE - 1))
-    sizes = np.abs(errors)
-    assert (sizes[-1] < [2e-4, 5e-4]).all()
-    assert (sizes[-1] < 0.2 * sizes[0]).all()
-
-
 LINES = ("CONT1", "CONT2")
 FIXED = {"a": -2773.5474109439, "c": -2928.74092725}
 CONVERGED = {"a": -2773.57307445, "c": -2928.76786014}
 FORCE_OF_CODE_ASTER = {"a": 664_075.264, "c": 660_238.472}
-MESH_CONVERGED_FORCE, MESH_CONVERGED_PRESSURE = 659_773.142, 2910.4071
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +102,7 @@ def test_continuous_contact_on_quadratic_triangles(meshes, forma04):
     pressure = contact.pressure[np.flatnonzero(contact.points == model.mesh.point("C1"))[0]]
     assert pressure == pytest.approx(2798.3287, rel=0.03)  # the training case's own check
     assert pressure == pytest.approx(2876.287, rel=0.005)  # code_aster
-    assert np.linalg.norm(contact.force) == pytest.approx(MESH_CONVERGED_FORCE, rel=5e-4)
+    assert np.linalg.norm(contact.force) == pytest.approx(FORCE, rel=5e-4)
     assert smooth_deviation(contact) < 0.02
 
 
@@ -138,16 +113,7 @@ def test_continuous_contact_on_quadratic_triangles(meshes, forma04):
 def test_no_integration_rule_leaves_a_multiplier_undetermined(integration, letter, meshes, forma04):
     model = forma04(meshes[letter], "continuous", integration=integration)
     contact = fc.solve(model, fc.linear_ramp(2))[-1].contact["hertz"]
-    assert np.linalg.norm(contact.force) == pytest.approx(MESH_CONVERGED_FORCE, rel=0.01)
-    assert contact.pressure_max == pytest.approx(MESH_CONVERGED_PRESSURE, rel=0.05)
-    assert np.abs(contact.multiplier).max() < 1.05 * MESH_CONVERGED_PRESSURE
-    assert contact.multiplier.min() > -0.1 * MESH_CONVERGED_PRESSURE
-
-
-def test_von_mises_is_largest_below_the_surface(meshes, forma04):
-    model = forma04(meshes["c"])
-    last = fc.solve(model, fc.linear_ramp(1))[-1]
-    top = int(np.argmax(last.von_mises))
-    assert last.von_mises[top] == pytest.approx(1738.4852, rel=0.01)
-    assert model.mesh.points[top, 0] == pytest.approx(0.0, abs=1e-9)
-    assert abs(model.mesh.points[top, 1]) == pytest.approx(5.645, abs=0.4)
+    assert np.linalg.norm(contact.force) == pytest.approx(FORCE, rel=0.01)
+    assert contact.pressure_max == pytest.approx(PRESSURE, rel=0.05)
+    assert np.abs(contact.multiplier).max() < 1.05 * PRESSURE
+    assert contact.multiplier.min() > -0.1 * PRESSURE

@@ -209,15 +209,3 @@ def test_a_plastic_law_that_does_not_yield_exchanges_heat_as_a_linear_one():
     scale = np.abs(linear.displacement).max()
     assert plastic.displacement == pytest.approx(linear.displacement, abs=1e-8 * scale)
     assert plastic.stress == pytest.approx(linear.stress, abs=1e-7 * np.abs(linear.stress).max())
-
-
-def test_results_and_restarts_of_hot_stretched_bodies_have_the_same_bits(tmp_path):
-    model = column(ALPHA, element="quad4")
-    steps = fc.solve(model, 4)
-    with fc.ResultWriter(tmp_path / "h.vtkhdf", model) as out:
-        fc.solve(model, fc.Ramp((0.25, 0.5)), on_step=out.write)
-    with fc.open_results(tmp_path / "h.vtkhdf") as half:
-        going_on, stored = fc.solve(model, fc.linear_ramp(4), resume=half), half[-1]
-    assert np.array_equal(going_on[-1].temperature, steps[-1].temperature)
-    assert np.array_equal(going_on[-1].displacement, steps[-1].displacement)
-    assert np.array_equal(stored.heat_flux, steps[1].heat_flux)

@@ -4,12 +4,9 @@ A quarter of every body is meshed. Radii are taken from first moments of the con
 mean distance from an axis of the ellipse is 3/8 of the semi-axis.
 """
 
-from functools import cache
-
 import numpy as np
 import pytest
 from models import elastic_model
-from pairwise import first_of
 
 import fastcontact as fc
 
@@ -39,28 +36,17 @@ def errors(contact, vertical, R_x, R_y, fit=False):
     return np.array([fitted if fit else pressure, *semi_axes]) / expected - 1
 
 
-@cache
-def ellipsoid_on_plane(element, formulation, size, stretch=1.0, growth=0.4, far=None, force=None):
-    """Contact of an elastic half-ellipsoid pressed on a rigid plane; its radii are 1 and stretch^2, the contact 0.1 wide.
-
-    By the displacement of its flat side, or by a force on that.
-    """
-    sphere = fc.generate.sphere_octant(
+def sphere_on_plane(element, formulation, size, growth=0.4, far=None):
+    """Contact of an elastic half-sphere of radius 1 pressed on a rigid plane; the contact is 0.1 wide."""
+    mesh = fc.generate.sphere_octant(
         element, R=1.0, contact_size=0.1 * size, contact_radius=0.13, growth=growth, size=far
     )
-    mesh = sphere.replace(points=sphere.points * [1.0, 1.0, stretch])
-    model = elastic_model(mesh, "3d", E=E, nu=NU, SYMMETRY_X="x", SYMMETRY_Z="z")
-    if force is None:
-        model.prescribe("SPHERE_TOP", y=-0.01)
-    else:
-        model.couple("SPHERE_TOP", "y")
-        model.add_force("SPHERE_TOP", y=-force)
+    model = elastic_model(mesh, "3d", E=E, nu=NU, SYMMETRY_X="x", SYMMETRY_Z="z", SPHERE_TOP={"y": -0.01})
     plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     model.add_obstacle("hertz", secondary="CONT_SPHERE", obstacle=plane, formulation=formulation)
     return fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].contact["hertz"]
 
 
-@cache
 def block_under_paraboloid(element, formulation, size, R_y=200.0, growth=0.4):
     """Contact of an elastic block under a rigid paraboloid of radii 100 and `R_y`, 8 contact radii wide and deep."""
     theory = fc.analytic.hertz_elliptical(E1=E, nu1=NU, R1x=100.0, R1y=R_y, force=1.0)
@@ -89,7 +75,7 @@ def block_under_paraboloid(element, formulation, size, R_y=200.0, growth=0.4):
 def test_a_sphere_on_a_rigid_plane_is_hertz_at_equal_force(element, formulation, size, fit):
     """A half-sphere with 4 to 6 edges over the contact radius, a tenth of its own: 9 800 unknowns with 4."""
     options = {"growth": 0.6, "far": 0.5} if element == "tet10" else {}
-    contact = ellipsoid_on_plane(element, formulation, size, **options)
+    contact = sphere_on_plane(element, formulation, size, **options)
     assert np.abs(errors(contact, 1, 1.0, 1.0, fit)).max() < 0.01
 
 
@@ -112,18 +98,3 @@ def test_an_elliptical_contact_is_hertz_at_equal_force(element, formulation, siz
 def test_a_rigid_sphere_on_a_block_of_tetrahedra_is_hertz_at_equal_force():
     contact = block_under_paraboloid("tet10", "continuous", 0.5, R_y=100.0, growth=0.6)
     assert np.abs(errors(contact, 2, 100.0, 100.0, fit=True)).max() < 0.01
-
-
-@pytest.mark.parametrize("case", first_of(1, ["sphere", "ellipse"]))
-def test_errors_fall_with_the_mesh(case):
-    """Of pressure and semi-axes together: each alone may pass through zero. Cells grow slower on finer meshes."""
-    found = []
-    for size in (0.5, 0.35, 0.25):
-        if case == "sphere":
-            contact = ellipsoid_on_plane("hex8", "node_to_segment", size, growth=1.6 * size)
-            found.append(np.linalg.norm(errors(contact, 1, 1.0, 1.0)))
-        else:
-            contact = block_under_paraboloid("hex8", "node_to_segment", size, growth=1.6 * size)
-            found.append(np.linalg.norm(errors(contact, 2, 100.0, 200.0)))
-    assert found[2] < found[1] < found[0]
-    assert found[2] < 0.5 * found[0]

@@ -1,7 +1,5 @@
 """Line contact in plane strain and Hertz at equal force: a rigid cylinder on a block, a half-cylinder on a plane."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 from models import elastic_model, made_of
@@ -21,7 +19,6 @@ def measured(contact, radius_of):
     return 2 * push.sum(), contact.pressure[np.argmin(distance)], radius_of(push @ distance / push.sum())
 
 
-@cache
 def against_hertz(element, formulation, size):
     """Relative errors of pressure and half-width of a block under a parabola, in half-widths of 1 about; growth 0.3."""
     mesh = fc.generate.graded_block(element, width=20.0, contact_radius=1.25, contact_size=size, growth=0.3)
@@ -47,13 +44,6 @@ def against_hertz(element, formulation, size):
 def test_a_rigid_cylinder_on_a_block_is_hertz_at_equal_force(element, formulation, size, bound):
     """What is left of quadratic elements, 4e-4, is the block of 20 half-widths that stands for a half-plane."""
     assert max(against_hertz(element, formulation, size)) < bound
-
-
-@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
-def test_errors_fall_with_the_mesh(formulation):
-    errors = [np.hypot(*against_hertz("quad4", formulation, size)) for size in (0.4, 0.2, 0.1)]
-    assert errors[2] < errors[1] < errors[0]
-    assert errors[2] < 0.3 * errors[0]
 
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])

@@ -388,27 +388,6 @@ def test_supported_nodes_shear_it_too():
     np.testing.assert_allclose(contact.shear[:, 0], -STIFFNESS * 0.004, rtol=1e-9)
 
 
-@pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
-def test_a_run_that_goes_on_knows_what_it_took_up(formulation):
-    model = sheared(formulation, 0.004)
-    whole = solved(model)
-    kept = []
-
-    class StoppedError(Exception):
-        pass
-
-    def stop(step):
-        kept.append(step)
-        if len(kept) == 2:
-            raise StoppedError
-
-    with pytest.raises(StoppedError):
-        solved(model, on_step=stop)
-    resumed = solved(sheared(formulation, 0.004), resume=kept)
-    np.testing.assert_array_equal(resumed[-1].displacement, whole[-1].displacement)
-    np.testing.assert_array_equal(resumed[2].contact["pair"].shear, whole[2].contact["pair"].shear)
-
-
 def test_tractions_of_earlier_files_continue_as_slips():
     """Restart data of earlier versions hold the tangential tractions in place of the elastic slips."""
     model = sheared("node_to_segment", 0.02)

@@ -161,12 +161,3 @@ REFUSED = {
 def test_a_rotation_that_makes_no_sense_is_refused(message: str) -> None:
     model = bar("plane_strain", "quad8", 1.0)
     refused(fc.ModelError, message, model.prescribe, "RIGHT", **REFUSED[message])
-
-
-def test_an_analysis_of_a_turning_support_goes_on_from_its_file(tmp_path) -> None:
-    model = bar("plane_strain", "quad8", 2.0)
-    whole = fc.solve(model, 3)
-    with fc.ResultWriter(tmp_path / "turn.vtkhdf", model) as out:
-        fc.solve(model, [1.0 / 3.0, 2.0 / 3.0], on_step=out.write)
-    again = list(fc.solve_steps(model, 3, resume=list(fc.open_results(tmp_path / "turn.vtkhdf"))))
-    assert again[-1].displacement == pytest.approx(whole[-1].displacement, abs=1e-12)

@@ -174,20 +174,6 @@ def test_bodies_on_springs():
     check_resumed(lambda: indented(springs=True), fc.linear_ramp(4), FRICTIONLESS)
 
 
-def test_an_analysis_that_failed_goes_on_from_its_last_step():
-    """Without enough updates for a step nor leave to cut it, and then with both."""
-    ramp, steps = fc.Ramp((0.05, 0.1, 1.0)), []
-    few = fc.Criteria(max_geometry_updates=3, max_halvings=0)
-    with pytest.raises(fc.ConvergenceError):
-        fc.solve(spheres(friction=0.1), ramp, criteria=few, on_step=steps.append)
-    assert steps
-    with pytest.raises(fc.ConvergenceError):
-        fc.solve(spheres(friction=0.1), ramp, criteria=few, resume=steps)
-    again = fc.solve(spheres(friction=0.1), ramp, resume=steps)
-    for found, expected in zip(again, fc.solve(spheres(friction=0.1), ramp), strict=True):
-        assert_same(found, expected, FRICTION)
-
-
 def test_only_the_last_step_keeps_its_state_and_what_was_given_stays_as_it_is():
     first = fc.solve(spheres(), fc.Ramp((0.2, 0.4)))
     assert [step.restart is None for step in first] == [True, False]
@@ -219,12 +205,6 @@ def test_solver_tolerances_and_limits_may_change():
     whole = fc.solve(spheres(), fc.Ramp((0.2, 0.4, 0.8)), linear_solver="direct")
     assert_same_to = np.abs(whole[-1].displacement).max() * 1e-8
     assert np.abs(again[-1].displacement - whole[-1].displacement).max() < assert_same_to
-
-
-def test_a_step_without_its_state_is_refused():
-    steps = fc.solve(spheres(), fc.linear_ramp(2))
-    with pytest.raises(fc.ModelError, match="step 1 does not contain restart data: use the last"):
-        fc.solve(spheres(), fc.linear_ramp(2), resume=steps[:1])
 
 
 def test_all_that_a_step_changes_is_kept_or_set_anew():

@@ -313,26 +313,6 @@ def test_the_tree_finds_what_one_facet_after_the_other_finds_of_search_3d(name):
     assert np.array_equal(found.facet[:-20], first[:-20])
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_the_order_of_points_and_facets_changes_nothing(name):
-    facets, points = wavy(name, 9)
-    found, rng = closest(points, facets), np.random.default_rng(12)
-    some = rng.permutation(len(points))
-    again = closest(points[some], facets)
-    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
-        assert np.array_equal(getattr(again, field), getattr(found, field)[some])
-    for i in some[:30]:
-        assert closest(points[i : i + 1], facets).facet[0] == found.facet[i]
-    turned = rng.permutation(len(facets))
-    other = closest(points, facets[turned])
-    assert np.abs(other.distance - found.distance).max() <= 1e-15 * found.distance.max()
-    # The same facet but where several meet in the closest point, and then the same point.
-    alike = turned[other.facet] == found.facet
-    assert alike.mean() > 0.5
-    assert np.array_equal(other.xi[alike], found.xi[alike])
-    assert np.abs(other.position - found.position)[:-20].max() < 1e-9
-
-
 @pytest.mark.parametrize("name", ["line2", "tri3", "quad4", "quad8"])
 def test_threads_do_not_change_a_bit(name, monkeypatch):
     if name == "line2":

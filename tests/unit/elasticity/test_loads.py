@@ -225,20 +225,6 @@ def model():
     return elastic_model(mesh, "plane_strain", BOTTOM="xy")
 
 
-@pytest.mark.parametrize(
-    ("function", "message"),
-    [
-        (lambda x: x, r"pressure on 'TOP' is a function that returned float64 numbers of shape \(\d+, 2\)"),
-        (lambda x: 1.0, r"shape \(\) for"),
-        (lambda x: x[:, 0] * np.nan, r"pressure on 'TOP' is nan at \["),
-        (lambda x: x[:, 0] * 1j, r"complex128"),
-    ],
-)
-def test_functions_are_checked_before_any_numerics(model, function, message):
-    model.add_pressure("TOP", function)
-    refused(fc.ModelError, message, model.check)
-
-
 def test_a_pressure_inside_the_solid_is_refused():
     mesh = fc.generate.block((1.0, 1.0), (2, 1), "quad4")
     inner = np.flatnonzero(np.abs(mesh.points[:, 0] - 0.5) < 1e-12)
@@ -260,13 +246,6 @@ def test_a_force_on_a_point_outside_all_solids_is_refused(model):
     for node in mesh.points_of("TOP"):
         lone.relate([(int(node), "y", 1.0), ("REFERENCE", "y", -1.0)])
     lone.check()
-
-
-def test_a_ramp_of_its_own_must_cover_the_instants(model):
-    model.add_pressure("TOP", 1.0, ramp=[(0, 0), (1, 1)])
-    model.check(fc.linear_ramp(2))
-    with pytest.raises(fc.ModelError, match=r"pressure on 'TOP' covers 0 to 1, but the analysis has the instant 1.5"):
-        model.check(fc.Ramp((0.5, 1.5), ((0, 0), (2, 1))))
 
 
 @pytest.mark.parametrize(

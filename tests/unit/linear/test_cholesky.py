@@ -114,13 +114,6 @@ def test_factors_reuse_what_has_not_changed(m):
     assert min(reused[2:]) > 0.0
 
 
-def test_factors_have_the_same_bits_again():
-    K = bsr_array(positive(300, 0.05, 7), blocksize=(2, 2))
-    one, other = (factors(K, np.arange(5)) for _ in range(2))
-    for a, b in zip((*one._L, one._d), (*other._L, other._d), strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
 @pytest.mark.parametrize(
     ("matrix", "message"),
     [

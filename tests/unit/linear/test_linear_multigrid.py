@@ -427,8 +427,6 @@ def test_both_precisions_agree_and_single_takes_half_the_memory():
     assert "levels, unknowns 5148 -> " in repr(single)
     assert "operator complexity 1." in repr(single)
     assert "MB" in repr(single)
-    with pytest.raises(fc.ModelError, match="'single' or 'double', not 'half'"):
-        Amg(precision="half")
 
 
 @pytest.mark.parametrize("compliance", [None, np.full(6, 1e-3)], ids=["exact", "soft"])

@@ -73,15 +73,6 @@ def test_bodies_that_touch_or_stand_apart_do_not_overlap():
         assert penetration(mesh, "3d", mesh.points) == []
 
 
-def test_an_overlap_without_contact_is_refused():
-    mesh = union(
-        box((2.0, 2.0, 1.0), (2, 2, 1), name="LOWER"),
-        box((0.6, 0.6, 1.0), (2, 2, 2), "hex8", (0.2, 0.1, 0.9), name="UPPER"),
-    )
-    model = elastic_model(mesh, "3d", E=1.0, LOWER="xyz", UPPER="xyz")
-    refused(fc.ModelError, r"body 'UPPER' overlaps body 'LOWER' by 0\.1 near", model.check)
-
-
 def ring(inner, outer, n, element):
     """A quarter of a ring, n cells along its arcs."""
     mesh = block((1.0, 1.0), (2, n), element)

@@ -266,16 +266,6 @@ def test_the_lock_counts_in_the_fingerprint():
     assert differing_parts(prints[0], prints[1]) == differing_parts(prints[1], prints[2]) == changed
 
 
-def test_a_run_goes_on_before_at_and_after_the_lock():
-    model = bar()
-    model.add_pretension("bolt", "CUT", force=1.0, locked_from=1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)])
-    whole = fc.solve(model, [0.5, 1.0, 1.5, 2.0])
-    assert [step.pretension["bolt"]["force"] for step in whole] == pytest.approx([0.5, 1.0, 1.0, 1.0])
-    for done in (1, 2, 3):
-        resumed = fc.solve(model, [0.5, 1.0, 1.5, 2.0], resume=fc.solve(model, [0.5, 1.0, 1.5, 2.0][:done]))
-        assert resumed[-1].displacement == pytest.approx(whole[-1].displacement, rel=1e-13, abs=1e-18)
-
-
 BOLT = """[[pretension]]
 name = "bolt"
 section = "CUT"

@@ -190,16 +190,6 @@ def test_the_mesh_comes_back_with_its_groups_and_their_order(path: Path) -> None
             np.testing.assert_array_equal(found[name], expected[name])
 
 
-def test_three_components_in_space(path: Path) -> None:
-    # There may be no solid element for space yet: the points alone must come back with all components.
-    mesh = fc.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0.5]], {"tri3": [[0, 1, 2]]}, {"skin": [0]})
-    write(path, 2, mesh)
-    with fc.open_results(path) as results:
-        assert results.mesh.dim == 3
-        assert_same(results[1], step_result(1, mesh))
-        assert results[1].stress.shape == (3, 6)
-
-
 def test_what_the_file_says_beside_the_steps(path: Path) -> None:
     model = SimpleNamespace(mesh=MESH, kinematics="plane_strain", case_text="title = 'é'\n[mesh]\n")
     with ResultWriter(path, model) as out:
@@ -476,15 +466,6 @@ def _datasets(group: h5py.Group) -> list[h5py.Dataset]:
     found: list[h5py.Dataset] = []
     group.visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset) else None)
     return found
-
-
-def test_a_file_put_in_the_place_of_the_running_one_is_not_touched(path: Path) -> None:
-    with ResultWriter(path, MESH) as out:
-        out.write(step_result(0))
-        path.unlink()
-        path.write_text("mine")
-        refused(FileError, r"is no longer there: .* after 1 steps\. Put it back and resume", out.write, step_result(1))
-    assert path.read_text() == "mine"
 
 
 def test_a_writer_that_is_forgotten_frees_the_path(path: Path) -> None:

@@ -132,24 +132,6 @@ def test_a_committed_file_is_a_file(tmp_path: Path) -> None:
 # ------------------------------------------------------------------------------------------- writing on
 
 
-def test_a_run_in_two_parts_is_the_run_in_one(path: Path) -> None:
-    whole = begun(path.with_name("whole.vtkhdf"), (0.25, 0.5, 0.75, 1.0), spheres(friction=0.3))
-    begun(path, (0.25, 0.5), spheres(friction=0.3))
-    assert open_results(path).complete
-    steps = resumed(path, fc.linear_ramp(4), spheres(friction=0.3))
-    assert [step.index for step in steps] == [1, 2, 3, 4]
-    results = open_results(path)
-    assert results.complete
-    assert len(results) == 4
-    for found, again, expected in zip(results, steps, whole, strict=True):
-        size = np.abs(expected.displacement).max()
-        assert np.abs(found.displacement - expected.displacement).max() <= 1e-10 * size
-        np.testing.assert_array_equal(found.displacement, again.displacement)
-        assert found.contact["hertz"].dissipation == pytest.approx(expected.contact["hertz"].dissipation, abs=1e-6)
-        assert found.iterations["history"] == again.iterations["history"]
-    assert [step.restart is None for step in results] == [True, True, True, False]
-
-
 def test_without_a_file_or_without_a_step_a_run_begins(path: Path) -> None:
     with ResultWriter(path, spheres(arc=2.0), resume=True) as out:
         assert (out.done, out.n_steps) == ([], 0)
@@ -230,30 +212,6 @@ def test_the_case_text_of_the_last_steps_counts(path: Path) -> None:
 # --------------------------------------------------------------------------------------------- refusals
 
 
-def other_cases() -> dict[str, tuple[fc.Model, fc.Ramp, str]]:
-    ramp = fc.linear_ramp(2)
-    material, support, contact, friction = spheres(E=1e4), spheres(), spheres(), spheres(friction=0.1)
-    support.fix("A1A2", "y")
-    contact.contact[0].options["projection_tolerance"] = 0.4
-    return {
-        "material": (material, ramp, "the materials"),
-        "support": (support, ramp, "the supports"),
-        "contact": (contact, ramp, "contact 'hertz'"),
-        "friction": (friction, ramp, "contact 'hertz'"),
-        "ramp": (spheres(), fc.Ramp((0.5, 1.0), ((0.0, 0.0), (1.0, 0.9))), "the load history up to 0.5"),
-    }
-
-
-@pytest.mark.parametrize("name", list(other_cases()))
-def test_another_case_is_refused_and_changes_nothing(name: str, path: Path) -> None:
-    begun(path, (0.5,))
-    before = path.read_bytes()
-    model, ramp, message = other_cases()[name]
-    refused(ModelError, rf"belong to another case; changed since: {message}\. Continue", resumed, path, ramp, model)
-    assert path.read_bytes() == before
-    assert os.listdir(path.parent) == [path.name]
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -294,21 +252,6 @@ def test_another_mesh_is_refused(path: Path) -> None:
     with pytest.raises(FileError, match=r"contain the cell fields none, not \['error'\]: ask for the same ones"):
         ResultWriter(path, spheres(), cell_fields=("error",), resume=True)
     assert path.read_bytes() == before
-    assert os.listdir(path.parent) == [path.name]
-
-
-def test_steps_without_their_state_are_refused(path: Path) -> None:
-    with ResultWriter(path, MESH) as out:
-        out.write(step_result(0))
-    model = fc.Model(spheres().mesh, "axisymmetric")
-    with ResultWriter(path, MESH, resume=True) as out, pytest.raises(ModelError, match="does not contain restart data"):
-        fc.solve(model, resume=out.done)
-
-
-def test_what_is_no_result_is_not_resumed(path: Path) -> None:
-    path.write_text("mine")
-    refused(FileError, "is not an HDF5 file", ResultWriter, path, MESH, resume=True)
-    assert path.read_text() == "mine"
     assert os.listdir(path.parent) == [path.name]
 
 

@@ -152,47 +152,6 @@ def solid_step(mesh: fc.Mesh) -> fc.StepResult:
     return fc.StepResult(1, 1.0, u, np.zeros((mesh.n_points, 6)), zero, zero, np.zeros_like(u))
 
 
-def test_vtk_reads_every_solid_through_it(tmp_path: Path) -> None:
-    """Cell types, nodes, and where VTK sees the middles of edges and the inside of the cells."""
-    xdmf = pytest.importorskip("vtkmodules.vtkIOXdmf2", reason="this VTK has no XDMF reader")
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    mesh = row_of(list(SOLIDS))
-    with ResultWriter(tmp_path / "r.vtkhdf", mesh, kinematics="3d") as out:
-        out.write(solid_step(mesh))
-    write_xdmf(tmp_path / "r.vtkhdf", tmp_path / "r.xdmf")
-    reader = xdmf.vtkXdmfReader()
-    reader.SetFileName(str(tmp_path / "r.xdmf"))
-    reader.Update()
-    grid = reader.GetOutputDataObject(0)
-    assert grid.GetNumberOfCells() == mesh.n_cells
-    np.testing.assert_array_equal(
-        vtk_to_numpy(grid.GetPointData().GetArray("displacement")), solid_step(mesh).displacement
-    )
-    number = 0
-    for name, block in mesh.solids.items():
-        for nodes in block.tolist():
-            cell = grid.GetCell(number)
-            assert cell.GetCellType() == elements.get(name).vtk
-            assert [cell.GetPointId(i) for i in range(len(nodes))] == nodes
-            for edge in map(cell.GetEdge, range(cell.GetNumberOfEdges())):
-                ends = [mesh.points[edge.GetPointId(i)] for i in range(edge.GetNumberOfPoints())]
-                if len(ends) == 3:
-                    np.testing.assert_allclose(ends[2], 0.5 * (ends[0] + ends[1]), atol=1e-14)
-            centre, found = [0.0] * 3, [0.0] * 3
-            weights = [0.0] * len(nodes)
-            cell.GetParametricCenter(centre)
-            cell.EvaluateLocation(_reference(0), centre, found, weights)
-            np.testing.assert_allclose(np.array(weights) @ mesh.points[nodes], found, atol=1e-12)
-            number += 1
-
-
-def _reference(value: int) -> object:
-    from vtkmodules.vtkCommonCore import reference
-
-    return reference(value)
-
-
 @pytest.mark.parametrize("name", list(SOLIDS))
 def test_every_solid_has_its_code(tmp_path: Path, name: str) -> None:
     """Names and codes as the XDMF library lists them."""

@@ -23,20 +23,6 @@ def test_supports_come_and_go(tmp_path):
         assert result.reaction[:, 2].sum() == pytest.approx(pressure)
 
 
-def test_going_on_behind_a_change(tmp_path):
-    """A run that stops and goes on anywhere has the same bits as one that does not."""
-    deck = deck_of(tmp_path, CUBE + COMING)
-    whole = fc.solve(deck.model, deck.ramp)
-    for begun in range(1, 5):
-        first = fc.solve(deck.model, fc.Ramp(deck.ramp.instants[:begun], deck.ramp.table))
-        path = tmp_path / f"{begun}.vtkhdf"
-        with fc.ResultWriter(path, deck.model) as out:
-            for own in first:
-                out.write(own)
-        rest = fc.solve(deck.model, deck.ramp, resume=fc.open_results(path))
-        assert np.array_equal(rest[-1].displacement, whole[-1].displacement), begun
-
-
 def test_an_auxiliary_support_is_taken_away(tmp_path):
     """The upper cube is held until it is pressed on, and then stands on contact alone."""
     apart = NODES.replace(", 1.\n12", ", 1.01\n12")  # nodes of its lower face, a little above the other cube

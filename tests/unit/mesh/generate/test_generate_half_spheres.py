@@ -102,13 +102,6 @@ def test_one_body_alone_is_half_of_both(element, body):
     assert one.n_cells * 2 == both.n_cells
 
 
-@pytest.mark.parametrize("element", ["tri3", "quad8"])
-def test_two_calls_give_the_same_bits(element):
-    first, second = coarse(element, 2), coarse(element, 2)
-    assert first.points.tobytes() == second.points.tobytes()
-    assert all(np.array_equal(first.cells[name], second.cells[name]) for name in first.cells)
-
-
 @pytest.mark.slow
 def test_lengths_scale_with_the_radius():
     small = fc.generate.half_spheres("quad4", R=1.0)

@@ -121,6 +121,8 @@ def test_moving_keeps_the_shape(dx, dy, scale, angle):
     before, after = fc.quality(mesh), fc.quality(moved)
     assert after.measure == pytest.approx(scale**2 * before.measure, rel=1e-6)
     assert after.longest_edge == pytest.approx(scale * before.longest_edge, rel=1e-6)
+    assert after.smallest_angle == pytest.approx(before.smallest_angle, rel=1e-6)
+    assert after.worst_aspect == pytest.approx(before.worst_aspect, rel=1e-6)
     assert after.n_bad == 0
 
 
