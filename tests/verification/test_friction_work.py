@@ -400,6 +400,7 @@ def test_nodes_that_touch_at_the_beginning_do_not_close_in_the_step():
         (3, "node_to_segment", True),
     ],
 )
+@pytest.mark.filterwarnings("ignore:.*integration points of complete facets")
 def test_nodes_beside_an_edge_of_the_other_side_were_not_open(dim, formulation, exchanged):
     """The lower block is longer than the upper one, and an edge of the upper one is within a facet of the lower one."""
     held, sides = (("LOWER_BOTTOM", ["CONT_LOWER", "CONT_UPPER"]), ("LOWER_ZMIN", ["LOWER_TOP", "UPPER_BOTTOM"]))[

@@ -321,6 +321,7 @@ def test_a_stack_of_plates_under_pressure_vibrates_as_each_plate_between_pressur
 
 @pytest.mark.parametrize("options", FORMULATIONS, ids=lambda own: "-".join(own.values()))
 @pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.filterwarnings("ignore:.*integration points of complete facets")
 def test_rods_pressed_end_to_end_between_pins_slide_past_each_other(options, swapped):
     """Turning both by t lengthens the distance L of the pins to L / cos(t): ``w^2 = P L / inertia``, and no buckling."""
     one, two = (

@@ -62,6 +62,7 @@ def test_flanks_beside_the_corner_of_a_punch_change_nothing(way, cells):
 @pytest.mark.each_value
 @pytest.mark.parametrize("way", WAYS, ids=NAMES)
 @pytest.mark.parametrize("shift", [0.55, 0.53, 0.51])
+@pytest.mark.filterwarnings("ignore:.*integration points of complete facets")
 def test_forces_of_both_sides_balance_in_moment(way, shift):
     """The punch is primary; nodes of the block stand 0.35, 0.21 and 0.07 of its facets beyond its edge."""
     model = punch(shift=shift)
