@@ -124,7 +124,8 @@ def result_warnings(
             peak = contacts[name]
             texts = [*_coarse_contact(pair, peak, state), *pressure_oscillation(pair, peak, problem.model)]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
-        warnings += [*pressures, *_pressure_peak_at_edge(pair, last, contact), *_sliding_past_ends(pair, contact)]
+        warnings += [*pressures, *_shear_oscillation(pair, contact), *_pressure_peak_at_edge(pair, last, contact)]
+        warnings += _sliding_past_ends(pair, contact)
         warnings += _unstable_wear(name, pair, state)
     warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_energy_imbalance(state)]
     return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]
@@ -156,8 +157,8 @@ def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: A
     if isinstance(penalty, float) and depth > NOTABLE * size:
         yield (
             f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
-            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or omit it. If it is "
-            f"the stiffness of a layer, such as a gasket, give it as a table: penalty=[(0, 0), (1, {penalty:.4g})]"
+            f"raise its penalty from {penalty:.4g} to about {2 * penalty * depth / (NOTABLE * size):.2g}, or omit it. If it "
+            f"is the stiffness of a layer, such as a gasket, give it as a table: penalty=[(0, 0), (1, {penalty:.4g})]"
         )
 
 
@@ -521,6 +522,31 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
         f"below their local mean, and by up to {0.5 * difference.max():.3g}: trust means over neighbouring nodes, or "
         f"{_oscillation_remedy(pair, model)}"
     )
+
+
+def _shear_oscillation(pair: Formulation, contact: ContactResult) -> Iterator[str]:
+    """Yield a warning where the shear of nodes whose neighbours all stick oscillates; compare `pressure_oscillation`.
+
+    A growing contact keeps the slip at which each integration point closes, which varies within the facet. Under a ball with
+    a coefficient of friction of one, with 5, 20 and 80 load steps, the measure is 0.65, 0.96 and 1.0 on quad8 cells, and 0.42
+    with half the facets; 0.55 on tri6 cells; 0.14 on quad4 cells; and up to 0.1 with mortar. Shear is accurate on average.
+    """
+    side = pair.secondary
+    others, adheres = _alternation_matrix(side), contact.sticking & contact.active
+    count = np.asarray(others.sum(axis=1)).ravel()
+    inside = adheres & (side.node_adjacency @ ~adheres == 0) & (count > 0)
+    if pair.options.kind in ALWAYS_CLOSED or pair.options.cohesion is not None or inside.sum() < MIN_NODES:
+        return
+    shear, mean = contact.shear[inside], (others @ contact.shear)[inside] / count[inside, None]
+    difference, size = np.linalg.norm(shear - mean, axis=1), np.linalg.norm(shear, axis=1)
+    ratio = float(np.median(difference / np.maximum(0.5 * (size + np.linalg.norm(mean, axis=1)), TINY)))
+    if ratio > ALTERNATING and size.mean() > NOTABLE * contact.pressure[inside].mean():
+        remedy = "use smaller facets" if pair.name == "mortar" else "use formulation mortar"
+        yield (
+            f"contact '{contact.name}': nodal shear of sticking nodes oscillates from node to node, typically by "
+            f"{0.5 * ratio:.0%} above and below its local mean, and by up to {0.5 * difference.max():.3g}: trust means over "
+            f"neighbouring nodes, or {remedy}. Pressures and resultants are not affected"
+        )
 
 
 def _oscillation_remedy(pair: Formulation, model: Model) -> str:
