@@ -529,7 +529,7 @@ def _shear_oscillation(pair: Formulation, contact: ContactResult) -> Iterator[st
 
     A growing contact keeps the slip at which each integration point closes, which varies within the facet. Under a ball with
     a coefficient of friction of one, with 5, 20 and 80 load steps, the measure is 0.65, 0.96 and 1.0 on quad8 cells, and 0.42
-    with half the facets; 0.55 on tri6 cells; 0.14 on quad4 cells; and up to 0.1 with mortar. Shear is accurate on average.
+    with half the facets; 0.55 on tri6 cells; 0.14 on quad4 cells; and up to 0.1 with mortar. Local means are accurate.
     """
     side = pair.secondary
     others, adheres = _alternation_matrix(side), contact.sticking & contact.active
