@@ -131,8 +131,8 @@ def result_warnings(
                 *pressure_oscillation(pair, peak, problem.model),
             ]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
-        warnings += [*pressures, *_shear_oscillation(pair, contact), *_pressure_peak_at_edge(pair, last, contact)]
-        warnings += _sliding_past_ends(pair, contact)
+        warnings += pressures or _shear_oscillation(pair, contact)
+        warnings += [*_pressure_peak_at_edge(pair, last, contact), *_sliding_past_ends(pair, contact)]
         warnings += _unstable_wear(name, pair, state)
     warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_energy_imbalance(state)]
     return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]
