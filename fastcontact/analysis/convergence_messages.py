@@ -16,6 +16,7 @@ from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.mesh.mesh import Mesh
@@ -188,8 +189,9 @@ def first_points(mesh: Mesh, points: Sequence[int]) -> str:
 def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
     """Return the remedy for a bilateral pair whose initial gaps exceed round-off, since such pairs close gaps of any width.
 
-    Without such a pair, return remedies for pairs that may alternate between facets at a node, supports of dual functions,
-    or branches of a law. Each remedy is for the first such pair in `nodes`, in which displacements change most.
+    Without such a pair, return remedies for pairs that may alternate at the edge of an obstacle, between facets at a node,
+    supports of dual functions, or branches of a law. Each remedy is for the first such pair in `nodes`, in which
+    displacements change most.
     """
     for name, pair in problem.pairs.items():
         if pair.options.kind == "bilateral":
@@ -198,12 +200,17 @@ def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
             if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
                 return [f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close"]
     pairs = {name: problem.pairs[name] for name in nodes}
+    rigid = [name for name, pair in pairs.items() if isinstance(pair.primary, RigidSide)]
+    edged = [
+        name for name in rigid if np.isinf(pairs[name].nodal_gap(Configuration.undeformed(pairs[name].points))[0]).any()
+    ]
     between_bodies = {name: pair for name, pair in pairs.items() if len(pair.primary.points)}
     faceted = [name for name, pair in between_bodies.items() if pair.normals == "facet"]
     dual = [name for name, pair in between_bodies.items() if getattr(pair, "multipliers", "") == "dual"]
     laws = {name: pair.options.cohesion for name, pair in pairs.items() if pair.options.cohesion is not None}
     ranges = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
     pairs_by_remedy = {
+        "Criteria(keep_pairing=True), since nodes move past the edge of the obstacle,": edged,
         'normals="averaged"': faceted, 'multipliers="standard"': dual,
         f"facets no longer than the range of adhesion, {min(ranges.values(), default=0.0):.3g},": list(ranges),
         "facets shorter than the cohesive zone": [name for name in laws if name not in ranges],

@@ -13,7 +13,7 @@ from fastcontact.errors import ModelError
 NOTABLE = 1e-2
 # Ratio, or excess of a ratio over one, above which a warning is given. It applies to
 # - the frictional work of nodes in the steps in which they close, relative to the total frictional work;
-# - the work of the stresses on strains that linear kinematics neglect, relative to that on strains;
+# - the error of the stiffness due to strains that linear kinematics neglect;
 # - strains, because the fraction of a strain that linear kinematics neglect is about as large as the strain;
 # - the wear depth, relative to the size of the model;
 # - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield;

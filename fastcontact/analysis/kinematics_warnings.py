@@ -3,6 +3,10 @@
 In a rotation by a small angle, linear kinematics neglect the strain ``0.5 W.T @ W``, where W is the antisymmetric part of
 the displacement gradient. The work of the stresses on this strain, relative to that on the linear strain, shows whether it
 matters. It vanishes for a beam in bending, whose stresses cancel over the thickness, but not for a belt in tension.
+
+The second variation of this work is ``u.K_sigma u = 2 N`` with the geometric stiffness K_sigma, where N is the work on the
+neglected strain, whereas ``u.K u = W`` is the work of the stresses on the linear strain. Under given forces, displacements
+are therefore wrong by about 2 N / W.
 """
 
 from __future__ import annotations
@@ -96,7 +100,7 @@ def large_rotation(problem: Problem, state: State, last: StepResult) -> Iterator
     ratio = np.abs(neglected) / np.maximum(work_by_body, least_work)
     # Even small rotations matter under large stresses. In bodies whose stresses are only due to neglected strains, the works
     # on strains and on neglected strains are about equal.
-    is_preloaded = bool(((ratio > WARNING_RATIO) & (ratio < 0.5)).any())
+    is_preloaded = bool(((2.0 * ratio > WARNING_RATIO) & (ratio < 0.5)).any())
     friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
     if angle > 0.5 * MOMENT_ERROR * friction or is_preloaded:
         yield from _neglected_rotation(problem, last, angle, neglected, ratio)
@@ -128,12 +132,14 @@ def _neglected_rotation(
     """
     mesh = problem.model.mesh
     worst = int(np.argmax(ratio))
-    if ratio[worst] > WARNING_RATIO:
+    error = 2.0 * ratio  # of the stiffness
+    if error[worst] > WARNING_RATIO:
         name = body_name(mesh, bodies(mesh)[1], worst)
-        comparison = f"{ratio[worst]:.0%} of their work on" if ratio[worst] <= 1.0 else "more work than on"
+        amount = f"about {error[worst]:.0%}" if error[worst] <= 1.0 else "more than 100%"
         yield (
-            f"rotations of up to {angle:.2g} rad matter in body {name}: on the strains that linear kinematics neglect its "
-            f"stresses would do {comparison} strains. Solve the model with strain='finite'"
+            f"rotations of up to {angle:.2g} rad matter in body {name}: linear kinematics neglect strains on which its "
+            f"stresses would do work, so that displacements, and forces due to prescribed displacements, may be wrong by "
+            f"{amount}. Solve the model with strain='finite'"
         )
         return
     capacity = _frictional_capacity(problem, last)

@@ -205,6 +205,14 @@ def outer_rows(
     missing = np.flatnonzero(rows < 0)
     if len(missing):
         position = mesh.points[facets[missing[0]]].mean(axis=0)
+        n_corners = elements.get(name).n_corners
+        for kind, outer in outer_facets(mesh).items():
+            is_other_order = kind != name and elements.get(kind).n_corners == n_corners
+            if is_other_order and (same_facets(outer[:, :n_corners], facets[missing, :n_corners]) >= 0).all():
+                raise error(
+                    f"facets of '{group}' are of type {name}, but those of the cells there are of type {kind}, first near "
+                    f"{position}: export both with the same order, or define the group by Mesh.with_facet_group"
+                )
         raise error(
             f"facets of '{group}' do not lie on the outside of a solid (number: {len(missing)} of {len(facets)}, first near "
             f"{position}){remedy}"

@@ -82,7 +82,7 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mas
         if not connected[points].any():
             raise ModelError(
                 f"{name} contains only points that belong to no solid cell (number: {len(points)}, first: point "
-                f"{points[0]}): name a group of the body"
+                f"{points[0]}): name a group of the body, or connect the points to it with add_coupling or relate"
             )
 
 

@@ -383,7 +383,10 @@ class ContactResult(NameSuggestions):
 
     @property
     def force_parts(self) -> tuple[float, float, float]:
-        """Magnitudes of `force` and of its normal and tangential parts [force]; without friction the last is zero."""
+        """Magnitudes of `force` and of the vector sums of the nodal normal and tangential forces [force].
+
+        Without friction the last one is zero. Where normals vary, the second is smaller than `normal_force`.
+        """
         along = self.normal_forces @ self._finite_normal if self.shear.any() else self.force
         along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
         total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact._tools.records import record
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
 from fastcontact.studies.report import Report, Rows, format_axes, marker, message, number, panels, percent, to_rows
@@ -244,8 +245,9 @@ class Sweep(Report):
         remarks = self.warnings_of((label_of(point.parameters), point.warnings) for point in self.points)
         remarks += [f"{label_of(choice)} failed: {text}" for choice, text in self.failed]
         theories = [{point.theory.get(name) for point in self.points} - {None} for name in self._main_quantities()]
-        values = [{point.values.get(name) for point in self.points} for name in self._main_quantities()]
-        if any(len(theory) == 1 < len(computed) for theory, computed in zip(theories, values, strict=True)):
+        values = [[point.values.get(name, math.nan) for point in self.points] for name in self._main_quantities()]
+        differ = [np.ptp(computed) > NOTABLE * np.max(np.abs(computed)) for computed in values]  # not so, given forces
+        if any(len(theory) == 1 and varies for theory, varies in zip(theories, differ, strict=True)):
             remarks += [
                 "the theory is the same for all points: a parameter in [study.parameters] can change keys of the theory, too"
             ]

@@ -189,7 +189,7 @@ MESH = [
     Mistake("bodies connected at a single node", lambda: solved(hanging_together()), fc.ModelError,
             r"1 rigid-body motion is not supported: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that is connected at point \d+ at \(1, 1\): rotation about \(1, 1\)\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies are connected only at nodes \(number: 1, first: point \d+ at \(1, 1\)\): merge whole facets, or leave the parts separate and define the contact"),
     Mistake("a support on a node without cells", lambda: solved(with_orphan()), fc.ModelError,
-            r"the displacement x prescribed on 'LONE' contains only points that belong to no solid cell \(number: 1, first: point 73\): name a group of the body"),
+            r"the displacement x prescribed on 'LONE' contains only points that belong to no solid cell \(number: 1, first: point 73\): name a group of the body, or connect the points to it with add_coupling or relate"),
     Mistake("a cell with an angle near 180 degrees", lambda: solved(flat_cell()), fc.FastcontactWarning,
             r"cell \d+ \(tri3 .*\) is poor: it has an angle of 17\d\.\d degrees; move its nodes or remesh"),
     Mistake("a cell with a Jacobian near zero", lambda: solved(nearly_folded()), fc.FastcontactWarning,

@@ -64,6 +64,8 @@ def test_a_soft_penalty_is_told_with_a_number():
         last = fc.solve(model, fc.linear_ramp(1))[-1]
     assert "raise its penalty" in last.warnings[0]
     assert last.warnings[0].endswith("give it as a table: penalty=[(0, 0), (1, 1000)]")
+    advised = float(last.warnings[0].split("to about ")[1].split(",")[0])
+    assert not fc.solve(touching(held(blocks()), "node_to_segment", penalty=advised), 1)[-1].warnings
     layer = fc.solve(touching(held(blocks()), "node_to_segment", penalty=[(0, 0), (1, 1e3)]), 1)[-1]
     assert not layer.warnings
     assert layer.displacement == pytest.approx(last.displacement, abs=1e-9)

@@ -219,3 +219,18 @@ def test_a_reused_tangent_with_which_contact_does_not_converge_is_replaced():
         for updates in (1, 60)
     )
     assert last.force == pytest.approx(other.force, rel=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:the largest plastic strain", "ignore:.*overshoot near the edge")
+def test_a_flat_punch_whose_edge_lies_on_a_node():
+    """The node at the edge alternates: loaded it moves outward past the edge, unloaded it returns. The load is Prandtl's."""
+    mesh = fc.generate.punched_block("quad8", punch_radius=1.0, extent=13.0, edge_size=0.2)
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=300.0))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("BOTTOM", "xy")
+    model.add_obstacle("punch", secondary="TOP", obstacle=fc.obstacles.FlatPunch(1.0), motion={"y": -0.1})
+    with pytest.raises(fc.ConvergenceError, match=r"Criteria\(keep_pairing=True\), since nodes move past the edge"):
+        fc.solve(model, 4, criteria=fc.Criteria(max_geometry_updates=15))
+    last = fc.solve(model, 4, criteria=fc.Criteria(keep_pairing=True))[-1]
+    assert -last.contact["punch"].force[1] == pytest.approx((2.0 + np.pi) * 300.0 / np.sqrt(3.0), rel=0.03)

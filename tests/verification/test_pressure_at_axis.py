@@ -212,3 +212,29 @@ def test_the_remedy_for_oscillating_pressures_suits_the_cells_there(element, cou
     told = [text for text in fc.solve(model, 1)[-1].warnings if "oscillate" in text]
     assert len(told) == (remedy is not None)
     assert remedy is None or remedy in told[0]
+
+
+@pytest.mark.filterwarnings("ignore:.*of the work of friction")
+@pytest.mark.parametrize(
+    ("element", "size", "formulation", "warned"),
+    [("quad8", 0.1, "continuous", True), ("quad8", 0.1, "mortar", False), ("quad4", 0.05, "mortar", False)],
+)
+def test_shear_under_a_ball_that_sticks(element, size, formulation, warned):
+    """Facets of growing contact keep the slip at which their points close, so that shear of quadratic facets oscillates."""
+    options = {"friction": 1.0, "formulation": formulation}
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        contact, _ = pressed_ball(element, size, fc.LinearElastic(E=1000.0, nu=0.3), 60.0, 10, **options)
+    texts = [
+        str(warning.message) for warning in told if "nodal shear of sticking nodes oscillates" in str(warning.message)
+    ]
+    assert contact.sticking[:10].all()
+    assert len(texts) == warned
+    shear = contact.shear[1:10, 0]
+    alternation = np.abs(np.diff(shear, 2)).mean() / (4.0 * shear.mean())
+    if warned:
+        assert "or use formulation mortar" in texts[0]
+        stated = float(texts[0].split("typically by ")[1].split("%")[0]) / 100.0
+        assert stated == pytest.approx(alternation, rel=0.5)
+    else:
+        assert alternation < 0.1

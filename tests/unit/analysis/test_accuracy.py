@@ -253,13 +253,25 @@ def test_contacts_smaller_than_a_facet_have_inaccurate_forces():
     force, (text,) = pushed_nose(12, formulation="mortar", multipliers="dual", friction=0.0)
     other, (plain,) = pushed_nose(12, formulation="continuous")
     assert (
-        "with fewer than 2 the force and its direction may be inaccurate, too; refine 'BOTTOM', or use formulation 'con"
-        in text
+        "with fewer than 2 the force and its direction may be inaccurate, too; refine 'BOTTOM', or, unless it is a sharp "
+        "corner, use formulation 'continuous'" in text
     )
     assert "refine 'BOTTOM'. At a sharp corner" in plain
     assert np.linalg.norm(other - exact) < 0.1 * np.linalg.norm(exact) < np.linalg.norm(force - exact)
     _, (rough,) = pushed_nose(12, formulation="continuous", friction=0.1)
     assert "its direction and the work of friction may be inaccurate" in rough
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*of the work of friction")
+@pytest.mark.parametrize(("n_facets", "advised"), [(40, True), (1600, False)])
+def test_formulations_with_too_many_constraints_are_not_recommended(n_facets, advised):
+    """With friction, 6000 constraints may be refused; continuous contact has four for each of the facets."""
+    mesh = fc.generate.block((float(n_facets), 1.0), (n_facets, 1), "quad8", (-0.5 * n_facets, -1.0))
+    model = elastic_model(mesh, "plane_strain", BOTTOM="xy")
+    ball = fc.obstacles.Sphere((0.5, 10.0), 10.0)
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.01}, friction=0.1, formulation="mortar")
+    (text,) = [text for text in fc.solve(model, 1)[-1].warnings if "across its radius" in text]
+    assert ("use formulation 'continuous'" in text) == advised
 
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")

@@ -61,6 +61,24 @@ def test_the_normal_says_which_side_gets_new_nodes():
     assert set(range(mesh.n_points, opened.n_points)) <= set(opened.point_groups["LINE"].tolist())
 
 
+@pytest.mark.parametrize(("element", "facet"), [("quad8", "line2"), ("hex20", "quad4")])
+def test_linear_facets_of_quadratic_cells(element, facet):
+    """Converters may write solids with mid-side nodes but facets without; a group by position is the remedy."""
+    whole = bar(element).with_facet_group("ROOF", at(2.0))
+    (block,) = whole.cells_of("ROOF").values()
+    linear = fc.Mesh(whole.points, whole.solids).with_facets(
+        {"ROOF": {facet: block[:, : elements.get(facet).n_corners]}}
+    )
+    said = f"facets of 'ROOF' are of type {facet}, but those of the cells there are of type .* Mesh.with_facet_group"
+    model = fc.Model(linear, "3d" if linear.dim == 3 else "plane_strain")
+    refused(fc.ModelError, said, model.add_pressure, "ROOF", 1.0)
+    sphere = fc.obstacles.Sphere((0.0,) * linear.dim, 1.0)
+    refused(fc.ContactError, said, model.add_obstacle, "ball", secondary="ROOF", obstacle=sphere)
+    model = fc.Model(linear.with_facet_group("ROOF", at(2.0)), model.kinematics)
+    model.add_pressure("ROOF", 1.0)
+    assert model.load_vector(model.loads[0])[:, 1].sum() == pytest.approx(-1.0)
+
+
 def test_a_group_by_place_uses_the_facets_that_are_there():
     mesh = bar("hex8")
     named = mesh.with_facet_group("ROOF", at(2.0))

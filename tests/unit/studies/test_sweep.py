@@ -222,6 +222,8 @@ def test_the_command_says_how_values_are_written(case, text, capsys):
     [
         ("flat-punch", {"obstacle.punch.motion.y": [-0.001, -0.002]}, True),
         ("flat-punch", {"theory.punch.approach": [0.001, 0.002]}, False),
+        ("force-driven-sphere", {"material[0].E": [2e4, 3e4]}, True),
+        ("force-driven-sphere", {"material[0].E": [2e4, 2.001e4]}, False),
         ("forma04c", {"approach": [0.4, 4.0]}, False),
     ],
 )
