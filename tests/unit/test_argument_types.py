@@ -169,6 +169,11 @@ def test_masks_are_not_lost_without_a_word(what):
     MASKED[what](lambda values: np.ma.array(values, mask=False))
 
 
+@pytest.mark.parametrize("what", ["table", "temperature", "points", "ramp"])
+def test_imaginary_parts_are_not_lost_without_a_word(what):
+    refused(fc.FastcontactError, r"must be|must hold", MASKED[what], lambda values: np.asarray(values, float) + 1j)
+
+
 @pytest.mark.parametrize(
     ("method", "given", "placed", "named"),
     [
