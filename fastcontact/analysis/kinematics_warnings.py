@@ -6,7 +6,8 @@ matters. It vanishes for a beam in bending, whose stresses cancel over the thick
 
 The second variation of this work is ``u.K_sigma u = 2 N`` with the geometric stiffness K_sigma, where N is the work on the
 neglected strain, whereas ``u.K u = W`` is the work of the stresses on the linear strain. Under given forces, displacements
-are therefore wrong by about 2 N / W.
+are therefore wrong by about 2 N / W. If displacements are prescribed and N is a cubic function of them, as in a disc spring,
+forces are wrong by 3 N / W, the derivative of N relative to that of W / 2.
 """
 
 from __future__ import annotations
@@ -37,6 +38,9 @@ from fastcontact.round_off import SINGLE_PRECISION, TINY
 # Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
 # bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.
 MOMENT_ERROR = 0.03
+# Estimated errors of displacements under given forces, and of forces due to prescribed motions, relative to the ratio of the
+# works on neglected and on linear strains.
+DISPLACEMENT_ERROR, FORCE_ERROR = 2.0, 3.0
 
 
 def large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
@@ -98,12 +102,15 @@ def large_rotation(problem: Problem, state: State, last: StepResult) -> Iterator
     # Bodies whose work on strains is round-off relative to that of other bodies are free of stress.
     least_work = max(SINGLE_PRECISION * work_by_body.max(initial=0.0), TINY)
     ratio = np.abs(neglected) / np.maximum(work_by_body, least_work)
+    load = problem.load_at(last.load_factor)
+    is_moved = bool(load.lift.any()) or any(motion.any() for motion in load.obstacles.values())
+    notable = (FORCE_ERROR if is_moved else DISPLACEMENT_ERROR) * ratio > WARNING_RATIO
     # Even small rotations matter under large stresses. In bodies whose stresses are only due to neglected strains, the works
     # on strains and on neglected strains are about equal.
-    is_preloaded = bool(((2.0 * ratio > WARNING_RATIO) & (ratio < 0.5)).any())
+    is_preloaded = bool((notable & (ratio < 0.5)).any())
     friction = min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0)
     if angle > 0.5 * MOMENT_ERROR * friction or is_preloaded:
-        yield from _neglected_rotation(problem, last, angle, neglected, ratio)
+        yield from _neglected_rotation(problem, last, angle, neglected, ratio, is_moved)
 
 
 def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
@@ -123,19 +130,19 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 
 def _neglected_rotation(
-    problem: Problem, last: StepResult, angle: float, neglected: Array, ratio: Array
+    problem: Problem, last: StepResult, angle: float, neglected: Array, ratio: Array, is_moved: bool
 ) -> Iterator[str]:
     """Yield a warning for the body in which linear kinematics neglect most.
 
     `angle` is the largest rotation [radian], `neglected` (n_bodies,) the work on neglected strains [energy], and `ratio`
-    (n_bodies,) its magnitude relative to the work on strains [-].
+    (n_bodies,) its magnitude relative to the work on strains [-]. `is_moved` is whether motions are prescribed.
     """
     mesh = problem.model.mesh
     worst = int(np.argmax(ratio))
-    error = 2.0 * ratio  # of the stiffness
-    if error[worst] > WARNING_RATIO:
+    error = float(ratio[worst]) * (FORCE_ERROR if is_moved else DISPLACEMENT_ERROR)
+    if error > WARNING_RATIO:
         name = body_name(mesh, bodies(mesh)[1], worst)
-        amount = f"about {error[worst]:.0%}" if error[worst] <= 1.0 else "more than 100%"
+        amount = f"{'up to' if is_moved else 'about'} {error:.0%}" if error <= 1.0 else "100% or more"
         yield (
             f"rotations of up to {angle:.2g} rad matter in body {name}: linear kinematics neglect strains on which its "
             f"stresses would do work, so that displacements, and forces due to prescribed displacements, may be wrong by "
@@ -144,13 +151,15 @@ def _neglected_rotation(
         return
     capacity = _frictional_capacity(problem, last)
     # The moment out of balance does twice the neglected work in a rotation. The neglected strain also changes pressures.
-    error = ratio + np.divide(2.0 * np.abs(neglected), capacity, out=np.zeros(len(capacity)), where=capacity > 0.0)
-    worst = int(np.argmax(np.where(capacity > 0.0, error, 0.0)))
-    if capacity[worst] > 0.0 and error[worst] > MOMENT_ERROR:
+    moment_error = ratio + np.divide(
+        2.0 * np.abs(neglected), capacity, out=np.zeros(len(capacity)), where=capacity > 0.0
+    )
+    worst = int(np.argmax(np.where(capacity > 0.0, moment_error, 0.0)))
+    if capacity[worst] > 0.0 and moment_error[worst] > MOMENT_ERROR:
         name = body_name(mesh, bodies(mesh)[1], worst)
         yield (
-            f"moments of friction on body {name} are wrong by up to {error[worst]:.1%}: it rotates by {angle:.2g} rad, "
-            "and linear kinematics apply forces at undeformed positions. Solve the model with strain='finite'"
+            f"moments of friction on body {name} are wrong by up to {moment_error[worst]:.1%}: it rotates by {angle:.2g} "
+            "rad, and linear kinematics apply forces at undeformed positions. Solve the model with strain='finite'"
         )
 
 

@@ -190,7 +190,8 @@ def _energy_imbalance(state: State) -> Iterator[str]:
             f"the energy of these load steps is out of balance: {work.imbalance:.3g} of the external work "
             f"{work.external:.4g} is neither strain energy ({work.strain_energy:.4g}), nor frictional work "
             f"({work.friction:.4g}), nor energy of penalties, {abs(work.imbalance) / work.largest:.1%} of the largest of "
-            "them: use more load steps if energies matter"
+            "them: use more load steps if energies matter, or exchange the sides if the contact area moves along the "
+            "secondary side"
         )
 
 
