@@ -452,6 +452,7 @@ DERIVATIVES = [
 @pytest.mark.filterwarnings("ignore:contact 'hertz'. the integration points of complete facets")
 @pytest.mark.filterwarnings("ignore:the energy of these load steps is out of balance")  # of nested shells
 @pytest.mark.parametrize(("make", "mesh", "options", "error"), DERIVATIVES)
+@pytest.mark.filterwarnings("ignore:.*nodal shear of sticking nodes")
 def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, error):
     """With friction, forces and slips are compared in tangents that follow the normals by the smallest rotation.
 

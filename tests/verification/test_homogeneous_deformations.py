@@ -230,6 +230,7 @@ def test_a_bonded_block_is_squeezed(element: str, n: int, error: float) -> None:
 @pytest.mark.filterwarnings("ignore:tri3 cells lock:fastcontact.FastcontactWarning")
 @pytest.mark.parametrize("element", ["tri3", "tet4", "quad4", "hex8"])
 @pytest.mark.parametrize("law", [LAW, fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.01)])
+@pytest.mark.filterwarnings("ignore:rotations of up to")
 def test_linear_triangles_and_tetrahedra_lock_and_a_warning_says_so(element: str, law) -> None:
     solid = element in ("tet4", "hex8")
     if solid:

@@ -99,6 +99,7 @@ def agrees(name, image, tolerance=1e-9):
 
 
 @pytest.mark.parametrize(("name", "change"), [*cases()])
+@pytest.mark.filterwarnings("ignore:.*integration points of complete facets")
 def test_an_image_has_the_image_of_the_result(name, change):
     agrees(name, *image(change, ALL[name]))
 

@@ -76,6 +76,7 @@ def test_a_cylinder_or_sphere_in_the_plane(formulation, options, kinematics):
 @pytest.mark.parametrize(
     ("formulation", "options"), first_of(2, [f for f in FORMULATIONS if f[0] != "node_to_segment"])
 )
+@pytest.mark.filterwarnings("ignore:.*integration points of complete facets")
 def test_on_quadratic_facets(formulation, options):
     same(lambda: cylinder("quad8"), formulation, options)
 
@@ -84,6 +85,7 @@ def test_on_quadratic_facets(formulation, options):
     ("formulation", "options"),
     [pytest.param(*f, marks=pytest.mark.slow) if f == ("continuous", {"friction": 0.2}) else f for f in FORMULATIONS],
 )
+@pytest.mark.filterwarnings("ignore:.*integration points of complete facets")
 def test_a_sphere_in_space(formulation, options):
     same(lambda: sphere("hex8"), formulation, options)
 

@@ -222,6 +222,7 @@ def test_a_reused_tangent_with_which_contact_does_not_converge_is_replaced():
 
 
 @pytest.mark.filterwarnings("ignore:the largest plastic strain", "ignore:.*overshoot near the edge")
+@pytest.mark.filterwarnings("ignore:rotations of up to")
 def test_a_flat_punch_whose_edge_lies_on_a_node():
     """The node at the edge alternates: loaded it moves outward past the edge, unloaded it returns. The load is Prandtl's."""
     mesh = fc.generate.punched_block("quad8", punch_radius=1.0, extent=13.0, edge_size=0.2)

@@ -151,7 +151,8 @@ def _may_intersect(low, high, origin, normal, radius, reach):
         squared_distance += offset * offset
         half_diagonal += 0.25 * ((high[d] - low[d]) * (high[d] - low[d]))
     half_diagonal = np.sqrt(half_diagonal)
-    return abs(along) <= reach + half_diagonal and squared_distance - along * along <= (radius + half_diagonal) ** 2
+    largest = radius + half_diagonal
+    return abs(along) <= reach + half_diagonal and squared_distance - along * along <= largest * largest
 
 
 @interpretable_kernel

@@ -262,18 +262,6 @@ def test_contacts_smaller_than_a_facet_have_inaccurate_forces():
     assert "its direction and the work of friction may be inaccurate" in rough
 
 
-@pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*of the work of friction")
-@pytest.mark.parametrize(("n_facets", "advised"), [(40, True), (1600, False)])
-def test_formulations_with_too_many_constraints_are_not_recommended(n_facets, advised):
-    """With friction, 6000 constraints may be refused; continuous contact has four for each of the facets."""
-    mesh = fc.generate.block((float(n_facets), 1.0), (n_facets, 1), "quad8", (-0.5 * n_facets, -1.0))
-    model = elastic_model(mesh, "plane_strain", BOTTOM="xy")
-    ball = fc.obstacles.Sphere((0.5, 10.0), 10.0)
-    model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.01}, friction=0.1, formulation="mortar")
-    (text,) = [text for text in fc.solve(model, 1)[-1].warnings if "across its radius" in text]
-    assert ("use formulation 'continuous'" in text) == advised
-
-
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 
 

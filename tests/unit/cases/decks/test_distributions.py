@@ -43,6 +43,7 @@ def wanted(tmp_path):
     return deck_of(tmp_path, NODES + CELLS + SETS + PLY + by_sections() + STEP, "sections.inp").solve()[0]
 
 
+@pytest.mark.filterwarnings("ignore:rotations of up to")
 def test_axes_by_cell_are_those_of_sections(tmp_path, wanted):
     deck = deck_of(tmp_path, NODES + CELLS + SETS + PLY + BY_CELL + SECTION + STEP)
     assert len(deck.model.materials) == 1
@@ -54,6 +55,7 @@ def test_axes_by_cell_are_those_of_sections(tmp_path, wanted):
     assert np.abs(wanted.displacement[:, 1]).max() > 1e-3  # the axes matter
 
 
+@pytest.mark.filterwarnings("ignore:rotations of up to")
 def test_in_a_part_with_its_instance_moved(tmp_path, wanted):
     text = "*Part, name=bar\n" + NODES + CELLS + SETS + BY_CELL + SECTION + "*End Part\n*Assembly, name=a\n"
     text += "*Instance, name=bar-1, part=bar\n5., 0., 0.\n*End Instance\n*End Assembly\n" + PLY
