@@ -124,7 +124,7 @@ class Delassus:
             V = csr_array((self.U.T @ N).T)
             matrix = V @ (V @ self.S).T + N.T @ scaled(N, self.d)
         try:
-            return bool(np.diag(np.linalg.cholesky(matrix)).min() ** 2 < LENGTH_ROUND_OFF)
+            return bool(np.diag(np.linalg.cholesky(matrix)).min(initial=np.inf) ** 2 < LENGTH_ROUND_OFF)
         except np.linalg.LinAlgError:
             return True
 
