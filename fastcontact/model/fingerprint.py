@@ -30,6 +30,7 @@ from fastcontact.model.parts.base import Support
 # Number of hexadecimal digits of a digest.
 N_DIGITS = 16
 SMOOTHING = "surface_smoothing of contact"
+CORNERS = "the integration (now at the nodes of corners, before 'gauss') of contact"
 
 
 def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[str, str]:
@@ -54,8 +55,9 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
         "the list of contact pairs": [pair.name for pair in model.contact],
-        **{f"contact '{pair.name}'": _without(pair, "surface_smoothing", "conductance") for pair in model.contact},
+        **{f"contact '{pair.name}'": _compared(pair) for pair in model.contact},
         **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
+        **{f"{CORNERS} '{pair.name}'": True for pair in model.contact if model.bind(pair).has_nodes_at_corners},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }
     return {"the mesh": digest_of_mesh(mesh), **{name: _digest(entry, mesh) for name, entry in inputs.items()}}
@@ -80,6 +82,12 @@ def formulation_of_digest(model: Model, name: str, digest: str | None) -> str | 
         if _digest(candidate, model.mesh) == digest:
             return ", ".join(f"{key}='{value}'" for key, value in {"formulation": formulation, **options}.items())
     return None
+
+
+def _compared(pair: ContactPair) -> ContactPair:
+    """Return a pair without the options that are compared by other parts, and without Gauss points, the earlier default."""
+    gauss = ["integration"] if pair.options.get("integration") == "gauss" else []
+    return _without(pair, "surface_smoothing", "conductance", *gauss)
 
 
 def _without(pair: ContactPair, *options: str) -> ContactPair:

@@ -28,7 +28,7 @@ def options(law: str, stress: float, length: float) -> dict[str, Any]:
 def with_law(given: Drawn, law: str) -> Drawn:
     """Return a drawn model all of whose pairs have a law."""
     last = fc.solve(given.model, given.ramp, **given.options)[-1]
-    added = options(law, float(last.von_mises.max()), float(np.abs(last.displacement).max()))
+    added = options(law, float(last.von_mises.max()) or 1.0, float(np.abs(last.displacement).max()) or 1.0)
     excluded = EXCLUDED.get(law, ("kind",))
     model = SpokenModel(given.model.mesh, given.model.kinematics, given.model.strain)
     for name, arguments, named in given.model.calls:

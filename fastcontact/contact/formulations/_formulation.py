@@ -272,6 +272,11 @@ class Formulation(ABC):
         constraints = self.unilateral(replace(undeformed, clearance_factor=self.options.initial_clearance_factor))
         return constraints.positions, constraints.gap0
 
+    @property
+    def has_nodes_at_corners(self) -> bool:
+        """Whether the integration points of some facets are the nodes, because the facets end at a corner."""
+        return False
+
     @cached_property
     def shortest_edge(self) -> float:
         """Smallest diameter of the facets, divided by the order of their shape functions [length]."""

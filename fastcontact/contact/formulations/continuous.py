@@ -106,6 +106,11 @@ class Continuous(PressureFieldFormulation):
         *merged, areas = (np.concatenate(both)[selected] for both in [*arrays, (areas, nodal_areas)])
         return Candidates(*merged), areas
 
+    @property
+    def has_nodes_at_corners(self) -> bool:
+        """See `Formulation`."""
+        return bool(self._facets_at_corners().any())
+
     def _points_of(self, rule: Callable[[str], quadrature.Rule]) -> tuple[Candidates, Array]:
         """Return the points on all facets of a quadrature `rule`, given by element type, and their areas (m,) [area]."""
         rules = [rule(block.element) for block in self.secondary.blocks]

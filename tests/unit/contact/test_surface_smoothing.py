@@ -204,6 +204,19 @@ def test_steps_with_and_without_smoothing_are_of_different_cases():
     assert differing_parts(curved[0], curved[2]) == []
 
 
+def test_steps_with_nodes_and_with_gauss_points_at_corners_are_of_different_cases():
+    """A file of an earlier version, which had Gauss points everywhere, goes on with integration="gauss"."""
+
+    def model(**options):
+        model = elastic_model(fc.generate.block(), BOTTOM="xy")
+        plane = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
+        model.add_obstacle("c", secondary="TOP", obstacle=plane, formulation="continuous", **options)
+        return fingerprint(model)
+
+    (part,) = differing_parts(model(), model(integration="gauss"))
+    assert "'gauss') of contact 'c'" in part
+
+
 def test_an_obstacle_has_no_facets_to_smooth():
     model = fit(kind="tied", clearance=None)
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
