@@ -1,4 +1,4 @@
-"""Internal data classes, and the functions of `dataclasses` for them."""
+"""Data classes that are not public, and the functions of `dataclasses` for them."""
 
 from __future__ import annotations
 

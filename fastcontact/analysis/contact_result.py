@@ -254,9 +254,8 @@ def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask,
     """
     field, may_pull = constraints.nodal_field, bool(constraints.equality.any())
     nodal_pressure, shares, areas = field.side_pressure(forces), field.nodal_forces(forces), field.nodal_areas
-    with_area = nodes_with_area(
-        areas, *(block.local for block in side.blocks)
-    )  # nodes that may receive shares of others
+    # Nodes that may receive shares of others.
+    with_area = nodes_with_area(areas, [block.local for block in side.blocks])
     while True:
         if not may_pull:
             closed = closed & (nodal_pressure >= 0.0)
@@ -318,7 +317,7 @@ def _within_cone(constraints: Constraints, shear: Array, pressure: Array, normal
     nearest nodes that can carry it, which preserves the resultant.
     """
     areas, limit = constraints.nodal_field.nodal_areas, constraints.friction.max() * np.maximum(pressure, 0.0)
-    receivers = (limit > 0.0) & nodes_with_area(areas, *(block.local for block in side.blocks))
+    receivers = (limit > 0.0) & nodes_with_area(areas, [block.local for block in side.blocks])
     while True:
         size = np.linalg.norm(shear, axis=1)
         over, receivers = size > (1.0 + SUM_ROUND_OFF) * limit, receivers & (size < limit)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import inspect
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastcontact import analytic
 from fastcontact._tools import toml_text
 from fastcontact._tools.paths import existing_file, is_stream
-from fastcontact._tools.records import field, record
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases import keys
 from fastcontact.cases.checks import Check, read_check
@@ -98,7 +98,7 @@ def digest(paths: Iterator[Path]) -> str:
     return hasher.hexdigest()
 
 
-@record
+@dataclass(frozen=True, eq=False)
 class Case:
     """A checked case file with its model.
 

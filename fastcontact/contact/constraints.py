@@ -373,6 +373,7 @@ class Constraints:
         return gaps if self.compliance is None else gaps + self._products_with_compliance(self.compliance, forces)
 
     def _products_with_compliance(self, C: MultiplierCompliance, forces: Array) -> Array:
+        """Return the products (1 + k, m) of C and `forces` (1 + k, m) along normals and tangents [length]."""
         axes = self.compliance_axes
         return np.einsum("md,amd->am", C.apply(np.einsum("am,amd->md", forces, axes)), axes)
 

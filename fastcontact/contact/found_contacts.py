@@ -14,7 +14,6 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import html_table
 from fastcontact._tools.lazy import import_library
-from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.facing_facets import FacingPoints, OuterFacets, facing_points
 from fastcontact.errors import ContactError
@@ -70,7 +69,7 @@ class FoundContact:
     reason: str
 
 
-@record
+@dataclass(frozen=True, eq=False, repr=False)
 class FoundContacts(Sequence[FoundContact]):
     """Result of `find_contacts`: a sequence of `FoundContact` that is printed as a table.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
@@ -16,10 +18,10 @@ from fastcontact.round_off import SINGLE_PRECISION
 NEGLIGIBLE_AREA = 1e-3
 
 
-def nodes_with_area(areas: AnyArray, *facet_nodes: Indices) -> Mask:
+def nodes_with_area(areas: AnyArray, facet_nodes: Sequence[Indices]) -> Mask:
     """Return the nodes (n,) whose `areas` (n,) are not negligible relative to the largest one on their facets [area].
 
-    `facet_nodes` are arrays (n_facets, n_nodes) with the nodes of facets of one element type each.
+    `facet_nodes` are arrays (n_facets, n_nodes), each with the nodes of facets of one element type.
     """
     largest = np.zeros(len(areas))
     for nodes in facet_nodes:

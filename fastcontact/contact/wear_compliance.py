@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from fastcontact._tools.neighbours import nearest
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import Constraints
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WearCompliance:
     """Wear depth at the end of a load step, linearised about an earlier solution of the step.
 

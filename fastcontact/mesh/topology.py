@@ -8,6 +8,7 @@ with two common nodes in 2D, or with three common nodes that are not collinear i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import wraps
 from types import MappingProxyType
 from typing import Concatenate, ParamSpec, TypeVar
@@ -220,7 +221,7 @@ def outer_rows(
     return rows
 
 
-@record
+@dataclass(frozen=True, eq=False)
 class OrderedLine:
     """The nodes of a line of facets in their order along the line.
 

@@ -30,7 +30,7 @@ from fastcontact.model.parts.base import Support
 # Number of hexadecimal digits of a digest.
 N_DIGITS = 16
 SMOOTHING = "surface_smoothing of contact"
-CORNERS = "the integration (now at the nodes of corners, before 'gauss') of contact"
+CORNERS = "the integration at corners (in earlier versions: 'gauss') of contact"
 
 
 def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[str, str]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 
 from fastcontact._tools.html_table import html_table
-from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_sides import MaterialSides
@@ -18,7 +18,7 @@ from fastcontact.results.units import value_text, with_unit
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
-@record
+@dataclass(frozen=True, eq=False)
 class MaterialStress:
     """Stress of each material at the nodes where materials meet.
 
@@ -133,7 +133,7 @@ def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple
     return half(closed), half(closed | beyond) if beyond.any() else float("inf")
 
 
-@record
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactResult(NameSuggestions):
     """State of one contact pair at the end of a load step.
 
@@ -410,7 +410,7 @@ class ContactsByName(dict[str, ContactResult]):
         raise KeyError(unknown("contact pair", str(name), self))
 
 
-@record
+@dataclass(frozen=True, eq=False, repr=False)
 class StepResult(NameSuggestions):
     """State at the end of one load step.
 

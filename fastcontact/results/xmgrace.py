@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import unicodedata
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.paths import PathLike, replacing
-from fastcontact._tools.records import record
 from fastcontact.arrays import Array
 from fastcontact.errors import CaseError, FileError, check_known
 
@@ -28,7 +28,7 @@ _PLAIN = str.maketrans("\u2212\u2013\u2014\u2018\u2019\u201c\u201d", "---''\"\""
 
 
 @typed(CaseError)
-@record
+@dataclass(frozen=True, eq=False)
 class Curve:
     """A curve of a plot.
 

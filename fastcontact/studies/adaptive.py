@@ -6,13 +6,13 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact._tools.records import record
 from fastcontact.analysis.progress import StatusLine
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.cases.case import Case, build_case, read_case
@@ -33,7 +33,7 @@ from fastcontact.studies.report import Report, Rows, format_axes, number, panels
 from fastcontact.studies.settings import Combination, Settings, make_mesh, matching_combination, recipe, settings
 
 
-@record
+@dataclass(frozen=True, eq=False)
 class Round:
     """Results on one mesh of an adaptive study.
 
@@ -83,7 +83,7 @@ class Round:
         return abs(self.values[quantity] / exact - 1.0) if exact else math.nan
 
 
-@record
+@dataclass(frozen=True, eq=False, repr=False)
 class AdaptiveStudy(Report):
     """The result of an adaptive study, with the attributes of `Report` and the following.
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from fastcontact._tools.records import record
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.cases.summary import finite_or_none
@@ -373,7 +373,7 @@ def draw_differences(ax: Any, all_series: Sequence[Series], best: Series, units:
 COMPARED = ("force", "pressure_max")
 
 
-@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Study(Report):
     """The result of a mesh-convergence study, with the attributes of `Report` and the following.
 

@@ -6,10 +6,10 @@ import base64
 import html
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from fastcontact._tools.html_table import html_table
-from fastcontact._tools.records import record
 from fastcontact._tools.versions import versions
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
@@ -197,7 +197,7 @@ def report_fields(case: Case) -> dict[str, Any]:
     return {"name": case.name, "title": case.title, "text": case.text, "units": units}
 
 
-@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Report:
     """The result of a study of a case or a function.
 

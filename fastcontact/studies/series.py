@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.summary import finite_or_none
 from fastcontact.studies.fit import Limit, step_orders
@@ -120,7 +119,7 @@ class Level(RunResult):
     number: int
 
 
-@record
+@dataclass(frozen=True, eq=False)
 class Series:
     """Results of one element type and formulation on all meshes.
 
@@ -288,7 +287,7 @@ class Point(RunResult):
         return self.values.get(quantity, math.nan) / denominator if denominator else math.nan
 
 
-@record
+@dataclass(frozen=True, eq=False)
 class TheoryCurve:
     """Theory of a case as a function of the parameter over which a sweep is drawn.
 

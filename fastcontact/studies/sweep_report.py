@@ -6,11 +6,11 @@ import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fastcontact._tools.records import record
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
@@ -156,7 +156,7 @@ STANDARD = ("force", "pressure_max", "contact_radius")
 DIFFERENCES = {"theory": "from_theory", "equal_force": "from_theory_at_equal_force", "reference": "from_reference"}
 
 
-@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Report):
     """The result of a parameter sweep, with the attributes of `Report` and the following.
 

@@ -1,12 +1,18 @@
 """The package: contents of distributions, and consistent metadata."""
 
+import dataclasses
 import json
 import re
 import tomllib
 
 import pytest
 
+import fastcontact as fc
 from fastcontact._tools.records import field, record, replace
+from fastcontact.cases.case import Case
+from fastcontact.studies.adaptive import AdaptiveStudy
+from fastcontact.studies.convergence_report import Study
+from fastcontact.studies.sweep_report import Sweep
 
 
 @pytest.fixture
@@ -60,3 +66,10 @@ def test_a_record_is_compared_by_identity_and_changed_by_replace():
     assert (pair.gap, pair.forces, replace(pair, gap=2.0).gap) == (1.0, [], 2.0)
     assert pair != Pair(1.0)
     assert len({pair, pair}) == 1
+
+
+def test_public_data_classes_reject_assignments():
+    public = [value for name in dir(fc) if dataclasses.is_dataclass(value := getattr(fc, name))]
+    assert {fc.StepResult, fc.ContactResult, fc.FoundContacts, fc.Mesh} <= set(public)
+    for kind in (*public, fc.obstacles.MeshedSurface, Study, Sweep, AdaptiveStudy, Case):
+        assert kind.__dataclass_params__.frozen, kind

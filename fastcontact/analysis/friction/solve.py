@@ -12,12 +12,12 @@ without forming F.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._tools.records import record, replace
 from fastcontact.analysis.friction import delassus, dense, eliminated
 from fastcontact.analysis.friction.cone_newton import SLIP_COMPLIANCE, Law, aligning_rotation, held_tangents, rotated
 from fastcontact.analysis.friction.delassus import Delassus
@@ -171,7 +171,7 @@ def _with_included(
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _IncludedProblem:
     """Contact problem of q constraints with friction, in terms of their Delassus operator, with rotated tangents.
 

@@ -150,7 +150,7 @@ class PressureField(NodalField):
         weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
         total = np.bincount(self.facet_nodes.ravel(), weight.ravel(), n)
         sums = np.bincount(self.facet_nodes.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
-        valid = nodes_with_area(total, self.facet_nodes)
+        valid = nodes_with_area(total, [self.facet_nodes])
         largest = np.where(valid[self.facet_nodes], self.shape, -np.inf).argmax(axis=1)
         nearest = self.facet_nodes[np.arange(len(gaps)), largest]
         return np.divide(sums, total, out=np.full(n, np.inf), where=valid), nearest
@@ -168,7 +168,7 @@ class PressureField(NodalField):
 
         Nodal gaps are not used: between facets of different curvature, nodes of facets in contact have open gaps.
         """
-        with_area = nodes_with_area(self.nodal_areas, self.facet_nodes)
+        with_area = nodes_with_area(self.nodal_areas, [self.facet_nodes])
         nodes, shape, n = self.facet_nodes[active], self.shape[active], len(gap)
         closed = _nearest(nodes, shape, n) | _nearest(nodes, np.where(with_area[nodes], shape, -np.inf), n)
         usable, of_active_facet = self.projection.areas > 0, np.zeros(n, bool)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact._tools.records import field, record
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.obstacles._facets import SurfaceFacets, surface_facets
 from fastcontact.contact.projection import (
@@ -23,7 +24,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 
 @typed(ContactError)
-@record
+@dataclass(frozen=True, eq=False)
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
