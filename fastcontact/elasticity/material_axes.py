@@ -109,7 +109,7 @@ def checked_axes(axes: Any) -> Axes:
     cosines = np.tril(vectors @ vectors.T, -1)
     i, j = np.unravel_index(np.abs(cosines).argmax(), cosines.shape)
     if abs(cosines[i, j]) > SINGLE_PRECISION:
-        angle = np.degrees(np.arccos(cosines[i, j]))
+        angle = np.degrees(np.arccos(np.clip(cosines[i, j], -1.0, 1.0)))
         raise ModelError(
             f"{caption} are not at right angles: the angle between vectors {j + 1} and {i + 1} is {angle:.8g} degrees"
         )

@@ -116,7 +116,9 @@ class FactorSolver(LinearSolver):
         """Return the factors of K (n, n), with the unknowns `last` (m,) eliminated last; ModelError if K is singular."""
         raise NotImplementedError
 
-    def prepare(self, K: bsr_array, modes: Array, involved: Indices | None = None, release: bool = False) -> bsr_array:
+    def prepare(
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
+    ) -> bsr_array:
         """Factorise K without modifying it; see `LinearSolver.prepare`.
 
         Raises

@@ -226,14 +226,16 @@ class LinearSolver(Protocol):
         """Whether `prepare` has condensed K statically to the `involved` unknowns."""
         return False
 
-    def prepare(self, K: bsr_array, modes: Array, involved: Indices | None = None, release: bool = False) -> Matrix:
+    def prepare(
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
+    ) -> Matrix:
         """Factorise the matrix, or build a multigrid hierarchy.
 
         Parameters
         ----------
         K : bsr_array (n, n)
             Symmetric positive definite matrix [force / length].
-        modes : ndarray (n, n_modes)
+        rigid_modes : ndarray (n, n_modes)
             Rigid-body modes, which span the near null space of K [length].
         involved : ndarray of int (k,), optional
             Unknowns that may occur in equations, which solvers may use to save work. By default, all unknowns may occur.

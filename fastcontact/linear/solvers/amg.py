@@ -72,9 +72,11 @@ class Amg(Multigrid, LinearSolver):
         """Whether a solution with a larger tolerance costs less; true until a factorisation has replaced multigrid."""
         return self.replacement is None
 
-    def prepare(self, K: bsr_array, modes: Array, involved: Indices | None = None, release: bool = False) -> Matrix:
+    def prepare(
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
+    ) -> Matrix:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        self.build(K, modes, release)
+        self.build(K, rigid_modes, release)
         self._involved, self.replacement, self._factor_solver, self.replacement_reason = involved, None, None, ""
         return self.K if release else K
 

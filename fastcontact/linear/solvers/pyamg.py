@@ -54,9 +54,11 @@ class Pyamg(LinearSolver):
         complexity = self._hierarchy.operator_complexity()
         return f"Pyamg({len(self._hierarchy.levels)} levels, unknowns {sizes}, operator complexity {complexity:.2f})"
 
-    def prepare(self, K: bsr_array, modes: Array, involved: Indices | None = None, release: bool = False) -> bsr_array:
+    def prepare(
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
+    ) -> bsr_array:
         """Build the hierarchy of K without modifying K; see `LinearSolver.prepare`."""
-        self.K, self._modes = K, modes
+        self.K, self._modes = K, rigid_modes
         self._constrain(None)
         self.columns = InverseColumns(K.shape[0], self._inverse_entries)
         return K
