@@ -108,6 +108,24 @@ def complementarity(settled, sizes: Sizes) -> tuple[float, float, float]:
     return float(-gap.min(initial=0.0)), float(-force.min(initial=0.0)), product
 
 
+def displaced_gaps(settled, u: np.ndarray, sizes: Sizes) -> float:
+    """Return by how much gaps of closed constraints differ from those of the displacements u (n_dofs,), over their size.
+
+    Only of constraints without compliance whose force is that of a node alone, and not with laws of two branches.
+    """
+    state, constraints = settled.solution, settled.constraints
+    if any(part.branches is not None for part in constraints.parts.values()):
+        return 0.0
+    closed = state.active & (constraints.softness == 0.0) & (constraints.wear_softness == 0.0)
+    for name, rows in constraints.rows.items():
+        closed[rows] &= not constraints.parts[name].coupled
+    if settled.nodes is not None:
+        representative = settled.nodes.representative
+        closed &= (np.bincount(representative, minlength=len(closed)) == 1) & (representative == np.arange(len(closed)))
+    apart = np.abs(constraints.gap0 + constraints.B @ u - state.gap)[closed]
+    return float(np.maximum(apart - sizes.round_off, 0.0).max(initial=0.0) / sizes.length)
+
+
 def friction(settled, sizes: Sizes) -> tuple[float, float]:
     """Return how far tangential forces leave Coulomb's cone, and what work they do along the slip, in units of `sizes`."""
     state, constraints = settled.solution, settled.constraints

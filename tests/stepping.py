@@ -11,9 +11,9 @@ from fastcontact.analysis.problem import prepare
 
 
 class Watched:
-    """The settled contact of the last load step, see `watching`."""
+    """The settled contact and the displacements (n_dofs,) of the last load step, see `watching`."""
 
-    settled = None
+    settled = u = None
 
 
 @contextmanager
@@ -23,7 +23,7 @@ def watching() -> Iterator[Watched]:
 
     def watched(*given, solve=page.newton_with_wear):
         solution = solve(*given)
-        found.settled = solution.settled
+        found.settled, found.u = solution.settled, solution.u
         return solution
 
     with patch.object(page, "newton_with_wear", watched):  # not in the search for other equilibria

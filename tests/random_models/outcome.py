@@ -22,6 +22,7 @@ BOUNDS = {
     "penetration": 1e-8,
     "tension": 1e-8,
     "product": 1e-8,
+    "displaced": 1e-8,
     "cone": 1e-8,
     "driving": 1e-8,
     "carried": 1e-9,
@@ -30,7 +31,7 @@ BOUNDS = {
 # What vanishes with interface laws, too; a layer across a gap transmits tractions along it with a moment.
 WITH_LAWS = ("balance", "given back")
 # With iterative solvers gaps are as accurate as displacements are.
-ITERATIVE = {"penetration": 1e-6, "product": 1e-6}
+ITERATIVE = {"penetration": 1e-6, "product": 1e-6, "displaced": 1e-6}
 
 
 # What another order of the same sums may change: displacements over their largest, forces over the sum of their sizes.
@@ -67,7 +68,7 @@ def solved(given: Drawn) -> dict[str, Any]:
     last, factor = steps[-1], float(np.interp(given.ramp.instants[-1], *zip(*given.ramp.table, strict=True)))
     iterative = given.options.get("linear_solver") == "amg"
     tolerance = 1e-10 * iterative
-    found = figures(given.model, last, watched.settled, factor, tolerance)
+    found = figures(given.model, last, watched, factor, tolerance)
     bounds = BOUNDS | (ITERATIVE if iterative else {})
     if "law" in given.labels:
         bounds = {name: bounds[name] for name in WITH_LAWS}
@@ -146,8 +147,9 @@ def _without_undetermined(mesh: fc.Mesh, apart: np.ndarray, step: fc.StepResult)
     return apart
 
 
-def figures(model: fc.Model, step: fc.StepResult, settled, factor: float, tolerance: float = 0.0) -> dict[str, float]:
+def figures(model: fc.Model, step: fc.StepResult, watched, factor: float, tolerance: float = 0.0) -> dict[str, float]:
     """Return what must vanish; see `mechanics`."""
+    settled = watched.settled
     balance, sizes = mechanics.out_of_balance(model, step, factor, tolerance)
     penetration, tension, product = mechanics.complementarity(settled, sizes)
     cone, driving = mechanics.friction(settled, sizes)
@@ -159,6 +161,7 @@ def figures(model: fc.Model, step: fc.StepResult, settled, factor: float, tolera
         "penetration": penetration,
         "tension": tension,
         "product": product,
+        "displaced": mechanics.displaced_gaps(settled, watched.u, sizes),
         "cone": cone,
         "driving": driving,
         "carried": max(mechanics.carried(model, step, settled, sizes, name) for name in step.contact),

@@ -34,8 +34,9 @@ def test_random_models_end_right():
 
 
 def test_once_wrong_models_end_right():
-    """A soft body on a stiff one, by multigrid; constraints that penetrate from the start; dual functions of a numbering."""
-    check([100358, 101460, 101521, 101568, 102727, 102979])
+    """A soft body on a stiff one, by multigrid; constraints that penetrate from the start; dual functions of a numbering;
+    pairs of which one is open and has a compliance."""
+    check([100358, 101460, 101521, 101568, 102727, 102979, 790048])
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
@@ -186,7 +187,7 @@ def moved(by, lower, upper, **options):
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     with watching() as watched:
         step = fc.solve(model, 1)[-1]
-    return model, step, watched.settled
+    return model, step, watched
 
 
 @pytest.fixture(scope="module")
@@ -224,8 +225,14 @@ def pair(step, **changes):
 
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_wrong_shows(rubbing, name):
-    model, step, settled = rubbing
-    assert figures(model, WRONG[name](step), settled, 1.0)[name] > BOUNDS[name]
+    model, step, watched = rubbing
+    assert figures(model, WRONG[name](step), watched, 1.0)[name] > BOUNDS[name]
+
+
+def test_gaps_that_displacements_do_not_have_show(rubbing):
+    model, step, watched = rubbing
+    wrong = SimpleNamespace(settled=watched.settled, u=1.01 * watched.u)
+    assert figures(model, step, wrong, 1.0)["displaced"] > BOUNDS["displaced"]
 
 
 @pytest.mark.parametrize(
@@ -239,9 +246,9 @@ def test_what_is_wrong_shows(rubbing, name):
     ],
 )
 def test_what_breaks_an_inequality_shows(rubbing, name, change):
-    model, step, settled = rubbing
+    model, step, watched = rubbing
     ((what, by),) = change.items()
-    state = settled.solution
+    state = watched.settled.solution
     values = getattr(state, what).copy()
     if what == "slip":
         values = by * state.tangential / np.abs(state.tangential).max()
@@ -249,8 +256,8 @@ def test_what_breaks_an_inequality_shows(rubbing, name, change):
         values = values + by * np.sign(values) * state.multiplier.max()
     else:
         values[np.argmax(state.multiplier)] = by * (1.0 if what == "gap" else state.multiplier.max())
-    wrong = SimpleNamespace(solution=replace(state, **{what: values}), constraints=settled.constraints)
-    assert figures(model, step, wrong, 1.0)[name] > BOUNDS[name]
+    wrong = replace(watched.settled, solution=replace(state, **{what: values}))
+    assert figures(model, step, SimpleNamespace(settled=wrong, u=watched.u), 1.0)[name] > BOUNDS[name]
 
 
 def test_only_the_moment_of_a_contact_that_is_called_too_coarse_is_told(rubbing):
@@ -270,10 +277,10 @@ def test_results_that_are_not_finite_show(rubbing):
 
 def test_forces_that_are_round_off_are_none():
     """A body moved freely: what is left of its internal forces is compared with what they are the sum of."""
-    model, step, settled = moved_freely()
+    model, step, watched = moved_freely()
     _, sizes = mechanics.out_of_balance(model, step, 1.0)
     assert sizes.force == np.inf
-    assert figures(model, step, settled, 1.0)["balance"] == 0.0
+    assert figures(model, step, watched, 1.0)["balance"] == 0.0
 
 
 def moved_freely():

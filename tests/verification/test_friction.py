@@ -140,3 +140,26 @@ def test_points_that_do_not_touch_are_not_part_of_the_dense_system():
     for name, contact in part.items():
         assert contact.force[1] < 0.0
         assert np.abs(whole[name].force - contact.force).max() < 1e-9 * np.abs(contact.force).max()
+
+
+@pytest.mark.filterwarnings("ignore:contact 'open' never closed")
+@pytest.mark.parametrize("formulation", ["continuous", "mortar"])
+def test_a_pair_that_stays_open_does_not_change_the_others(formulation):
+    """Pressure fields couple constraints; where none of them may close, nothing of the coupling may be left."""
+    box, block = fc.generate.box, ((1.0, 1.0, 1.0), (3, 3, 2))
+    blocks = {"A_": box(*block, origin=(0.0, 0.0, 1.0)), "B_": box(*block, origin=(2.0, 0.0, 1.1))}
+    mesh = united(L_=box((3.0, 1.0, 1.0), (6, 2, 2)), **blocks)
+    steps = []
+    for with_open_pair in (False, True):
+        model = elastic_model(mesh, L_ZMIN="xyz", B_ZMAX="xyz", A_ZMAX={"z": -0.01, "x": 0.001, "y": 0.0})
+        if with_open_pair:
+            options = {"multipliers": "standard"} if formulation == "mortar" else {}
+            model.add_contact(
+                "open", secondary="B_ZMIN", primary="L_ZMAX", formulation=formulation, friction=0.3, **options
+            )
+        model.add_contact("closed", secondary="A_ZMIN", primary="L_ZMAX", formulation="mortar", friction=0.3)
+        steps.append(fc.solve(model, 2)[-1])
+    alone, beside = steps
+    assert np.abs(beside.displacement - alone.displacement).max() < 1e-9 * np.abs(alone.displacement).max()
+    assert beside.contact["closed"].force == pytest.approx(alone.contact["closed"].force, rel=1e-9)
+    assert not beside.contact["open"].active.any()
