@@ -7,7 +7,7 @@ elements six, because three points do not suffice at an axis of symmetry.
 import numpy as np
 
 from fastcontact.mesh.elements._element import AnyArray, Element, quadratic, quadratic_simplex
-from fastcontact.mesh.quadrature import triangle_1, triangle_6
+from fastcontact.mesh.quadrature import triangle
 
 EDGES = ((0, 1), (1, 2), (2, 0))
 
@@ -19,9 +19,9 @@ def shape(xi: AnyArray) -> AnyArray:
 
 TRI3 = Element(
     "tri3", np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), EDGES, facets=EDGES, shape=shape,
-    quadrature=triangle_1(), meshio="triangle", med="TR3", vtk=5, quadratic="tri6",
+    quadrature=triangle(1), meshio="triangle", med="TR3", vtk=5, quadratic="tri6",
 )  # fmt: skip
 TRI6 = quadratic(
-    "tri6", TRI3, quadratic_simplex(TRI3), quadrature=triangle_6(), meshio="triangle6", med="TR6", vtk=22, dilatation=0
+    "tri6", TRI3, quadratic_simplex(TRI3), quadrature=triangle(4), meshio="triangle6", med="TR6", vtk=22, dilatation=0
 )
 ELEMENTS = TRI3, TRI6

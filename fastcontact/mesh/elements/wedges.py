@@ -11,7 +11,7 @@ import numpy as np
 from fastcontact.mesh.elements._element import AnyArray, Element, product, quadratic, with_midpoints
 from fastcontact.mesh.elements.lines import LINE2, LINE3
 from fastcontact.mesh.elements.triangles import TRI3, TRI6
-from fastcontact.mesh.quadrature import gauss_line, tensor_product, triangle_3_sides, triangle_7
+from fastcontact.mesh.quadrature import gauss_line, tensor_product, triangle, triangle_3_sides
 
 NODES, shape = product(np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)]), TRI3, LINE2)
 Z = NODES[:, 2]
@@ -38,7 +38,7 @@ def shape_15(xi: AnyArray) -> AnyArray:
 
 WEDGE15 = quadratic(
     "wedge15", WEDGE6, (with_midpoints(WEDGE6), shape_15), meshio="wedge15", med="P15", vtk=26, dilatation=0,
-    quadrature=tensor_product(triangle_7(), gauss_line(3)),
+    quadrature=tensor_product(triangle(5), gauss_line(3)),
 )  # fmt: skip
 CENTRES = np.column_stack([TRI6.nodes[3:], np.zeros(3)])
 WEDGE18 = quadratic(
