@@ -234,3 +234,14 @@ def determinants(J: Array) -> Array:
     second = J[..., 1, 0] * J[..., 2, 2] - J[..., 1, 2] * J[..., 2, 0]
     third = J[..., 1, 0] * J[..., 2, 1] - J[..., 1, 1] * J[..., 2, 0]
     return np.asarray(J[..., 0, 0] * minor - J[..., 0, 1] * second + J[..., 0, 2] * third)
+
+
+def jacobians(x: Array, gradients: Array) -> Array:
+    """Return the Jacobian determinants (n_q, n_cells) [length^dim] of cells at n_q points.
+
+    `x` (n_cells, n_nodes, dim) [length] are the positions of the nodes, and `gradients` (n_q, n_nodes, dim) [-] the
+    derivatives of the shape functions at the points.
+    """
+    n_cells, n_nodes, dim = x.shape
+    rows = np.moveaxis(x, 2, 1).reshape(-1, n_nodes)
+    return np.stack([determinants((rows @ gradient).reshape(n_cells, dim, dim)) for gradient in gradients])

@@ -220,8 +220,7 @@ def extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
     """
     element, x = elements.get(name), mesh.points[mesh.cells[name]]
     _, gradients, weights = element.tables
-    rows = np.moveaxis(x, 2, 1).reshape(-1, element.n_nodes)
-    jacobians = [quadrature.determinants((rows @ dN).reshape(-1, mesh.dim, mesh.dim)) for dN in gradients]
+    determinants = quadrature.jacobians(x, gradients)
     ends = x[:, element.edges]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
-    return weights @ np.array(jacobians), np.min(jacobians, axis=0), np.max(jacobians, axis=0), longest
+    return weights @ determinants, determinants.min(axis=0), determinants.max(axis=0), longest
