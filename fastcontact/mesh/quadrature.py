@@ -7,6 +7,7 @@ up to the measure of the reference cell.
 from __future__ import annotations
 
 from functools import cache
+from itertools import permutations
 
 import numpy as np
 
@@ -32,74 +33,52 @@ def gauss_square(n: int) -> Rule:
     return tensor_product(gauss_line(n), gauss_line(n))
 
 
-def triangle_1() -> Rule:
-    """Return the centroid rule on the triangle (0, 0), (1, 0), (0, 1), exact to degree 1."""
-    return np.array([[1.0, 1.0]]) / 3.0, np.array([0.5])
+# Symmetric rules on the triangle by degree: the weights of orbits of one, three and six points, each followed by the
+# independent barycentric coordinates of its points (Strang and Fix, 1973; Dunavant, 1985; Radon, 1948).
+_ROOTS = np.sqrt(15.0), -np.sqrt(15.0)
+_TRIANGLE: dict[int, list[tuple[float, ...]]] = {
+    1: [(1.0,)],
+    2: [(1.0 / 3.0, 1.0 / 6.0)],
+    4: [(0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)],
+    5: [(9.0 / 40.0,), *(((155.0 + root) / 1200.0, (6.0 + root) / 21.0) for root in _ROOTS)],
+    6: [
+        (0.1167862757263978, 0.2492867451708992),
+        (0.05084490637020978, 0.06308901449150417),
+        (0.08285107561836291, 0.05314504984480938, 0.3103524510337927),
+    ],
+    8: [
+        (0.144315607677777,),
+        (0.09509163426728974, 0.4592925882927181),
+        (0.1032173705347262, 0.1705693077517538),
+        (0.03245849762319998, 0.05054722831703223),
+        (0.0272303141744292, 0.008394777409941592, 0.2631128296346346),
+    ],
+}
 
 
-def triangle_3() -> Rule:
-    """Return the three-point rule on the triangle, with interior points, exact to degree 2 (Strang and Fix, 1973)."""
-    return np.array([[1.0, 1.0], [4.0, 1.0], [1.0, 4.0]]) / 6.0, np.full(3, 1.0 / 6.0)
+def triangle(degree: int) -> Rule:
+    """Return the symmetric rule, with interior points, on the triangle (0, 0), (1, 0), (0, 1) that is exact to `degree`.
 
-
-def triangle_6() -> Rule:
-    """Return the six-point rule on the triangle, with interior points, exact to degree 4 (Dunavant, 1985)."""
-    return _orbit_rule([], [(0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)], [])
+    The degree is 1, 2, 4, 5, 6 or 8; the rule has 1, 3, 6, 7, 12 or 16 points.
+    """
+    return _orbit_rule(_TRIANGLE[degree])
 
 
 def triangle_3_sides() -> Rule:
     """Return the three-point rule on the triangle, with midpoints of sides, exact to degree 2 (Strang and Fix, 1973)."""
-    return np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]]) / 2.0, np.full(3, 1.0 / 6.0)
+    return _orbit_rule([(1.0 / 3.0, 0.5)])
 
 
-def triangle_7() -> Rule:
-    """Return the seven-point rule on the triangle, with interior points, exact to degree 5 (Radon, 1948)."""
-    roots = np.sqrt(15.0) * np.array([1.0, -1.0])
-    return _orbit_rule([9.0 / 40.0], [((155.0 + root) / 1200.0, (6.0 + root) / 21.0) for root in roots], [])
-
-
-def triangle_12() -> Rule:
-    """Return the twelve-point rule on the triangle, with interior points, exact to degree 6 (Dunavant, 1985)."""
-    return _orbit_rule(
-        [],
-        [(0.1167862757263978, 0.2492867451708992), (0.05084490637020978, 0.06308901449150417)],
-        [(0.08285107561836291, 0.05314504984480938, 0.3103524510337927)],
-    )
-
-
-def triangle_16() -> Rule:
-    """Return the sixteen-point rule on the triangle, with interior points, exact to degree 8 (Dunavant, 1985)."""
-    return _orbit_rule(
-        [0.144315607677777],
-        [
-            (0.09509163426728974, 0.4592925882927181),
-            (0.1032173705347262, 0.1705693077517538),
-            (0.03245849762319998, 0.05054722831703223),
-        ],
-        [(0.0272303141744292, 0.008394777409941592, 0.2631128296346346)],
-    )
-
-
-def _orbit_rule(one: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]) -> Rule:
-    """Return the symmetric rule on the triangle with the given orbits of one, three and six points.
-
-    Each orbit is given by the weight of its points and by their independent barycentric coordinates: none for the centroid,
-    one for orbits of three points, and two for orbits of six. The weights of all points add up to 1.
-    """
-    points, weights = [[1.0 / 3.0, 1.0 / 3.0] for _ in one], list(one)
-    for weight, a in threes:
-        points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
-        weights += [weight] * 3
-    for weight, a, b in sixes:
-        c = 1 - a - b
-        points += [[a, b], [b, a], [a, c], [c, a], [b, c], [c, b]]
-        weights += [weight] * 6
+def _orbit_rule(orbits: list[tuple[float, ...]]) -> Rule:
+    """Return the symmetric rule on the triangle whose orbits have the given weights and barycentric coordinates."""
+    points: list[tuple[float, float]] = []
+    weights: list[float] = []
+    for weight, *coordinates in orbits:
+        a, b = (*coordinates, *coordinates, 1.0 / 3.0, 1.0 / 3.0)[:2]
+        orbit = dict.fromkeys(permutations((a, b, 1 - (a + b) if coordinates else a)))
+        points += [(y, x) for x, y, _ in orbit]
+        weights += [weight] * len(orbit)
     return np.array(points), np.array(weights) / 2.0
-
-
-def triangle(degree: int) -> Rule:
-    """Return the symmetric rule on the triangle that is exact to `degree` 2, 4, 6 or 8; it has 3, 6, 12 or 16 points."""
-    return {2: triangle_3, 4: triangle_6, 6: triangle_12, 8: triangle_16}[degree]()
 
 
 def triangle_7_closed() -> Rule:
@@ -255,3 +234,14 @@ def determinants(J: Array) -> Array:
     second = J[..., 1, 0] * J[..., 2, 2] - J[..., 1, 2] * J[..., 2, 0]
     third = J[..., 1, 0] * J[..., 2, 1] - J[..., 1, 1] * J[..., 2, 0]
     return np.asarray(J[..., 0, 0] * minor - J[..., 0, 1] * second + J[..., 0, 2] * third)
+
+
+def jacobians(x: Array, gradients: Array) -> Array:
+    """Return the Jacobian determinants (n_q, n_cells) [length^dim] of cells at n_q points.
+
+    `x` (n_cells, n_nodes, dim) [length] are the positions of the nodes, and `gradients` (n_q, n_nodes, dim) [-] the
+    derivatives of the shape functions at the points.
+    """
+    n_cells, n_nodes, dim = x.shape
+    rows = np.moveaxis(x, 2, 1).reshape(-1, n_nodes)
+    return np.stack([determinants((rows @ gradient).reshape(n_cells, dim, dim)) for gradient in gradients])

@@ -9,7 +9,7 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask
 from fastcontact.errors import MeshError
-from fastcontact.mesh import elements, quality_kernels
+from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh
 
 # Jacobians below this fraction of the square, in 3D of the cube, of the longest edge are attributed to round-off.
@@ -131,7 +131,7 @@ def poorest_cell(mesh: Mesh) -> str:
     such effect; Babuska and Aziz, 1976), or if it is nearly flat in 3D.
     """
     for name in mesh.solids:
-        measure, min_det, max_det, longest = _extremes(mesh, name)
+        measure, min_det, max_det, longest = extremes(mesh, name)
         # For each criterion: the excess over its limit, the value, and the text of the message.
         ratio, volume = min_det / max_det, measure / longest**3
         text = "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh"
@@ -207,17 +207,20 @@ def corner_angles(corners: Array) -> Array:
 
 def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
     """Return the area or volume (n_cells,) of the cells of one type, and the masks of degenerate and of inverted cells."""
-    measure, min_det, max_det, longest = _extremes(mesh, name)
+    measure, min_det, max_det, longest = extremes(mesh, name)
     tolerance = _ROUND_OFF * longest**mesh.dim
     degenerate = np.maximum(np.abs(min_det), np.abs(max_det)) <= tolerance
     return measure, degenerate, (min_det <= tolerance) & ~degenerate
 
 
-def _extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
-    """Return the area or volume, the smallest and the largest Jacobian, and the longest edge of each cell (n_cells,)."""
-    element = elements.get(name)
-    _, dN, weights = element.tables
-    min_det, max_det, measure, longest = np.empty((4, len(mesh.cells[name])))
-    edges = np.array(element.edges, np.intp)
-    quality_kernels.extremes(mesh.points, mesh.cells[name], dN, weights, edges, min_det, max_det, measure, longest)
-    return measure, min_det, max_det, longest
+def extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
+    """Return the area or volume, the smallest and the largest Jacobian, and the longest edge of each cell (n_cells,).
+
+    Jacobians are those at the quadrature points, and edges are treated as straight.
+    """
+    element, x = elements.get(name), mesh.points[mesh.cells[name]]
+    _, gradients, weights = element.tables
+    determinants = quadrature.jacobians(x, gradients)
+    ends = x[:, element.edges]
+    longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
+    return weights @ determinants, determinants.min(axis=0), determinants.max(axis=0), longest

@@ -39,10 +39,7 @@ def corner_measures(mesh: Mesh, name: str) -> Array:
     """
     linear = elements.get(elements.get(name).linear)
     _, gradients, weights = linear.tables
-    corners = mesh.points[mesh.cells[name][:, : linear.n_nodes]]
-    # Adding one quadrature point at a time limits the memory to a few arrays of length n_cells.
-    jacobians = (np.einsum("cni,nj->cij", corners, gradient) for gradient in gradients)
-    return np.asarray(sum(w * quadrature.determinants(J) for w, J in zip(weights, jacobians, strict=True)))
+    return weights @ quadrature.jacobians(mesh.points[mesh.cells[name][:, : linear.n_nodes]], gradients)
 
 
 @typed(MeshError)
@@ -356,19 +353,14 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
 
     `label` (n_solids,) contains the part of each solid cell. The part of points without a solid cell is -1.
     """
-    part = np.full(mesh.n_points, -1, np.intp)
-    shared = np.zeros(mesh.n_points, bool)
-    ends = np.cumsum([len(block) for block in mesh.solids.values()])
-    cells_and_parts = list(zip(mesh.solids.values(), np.split(label, ends[:-1]), strict=True))
-    for block, owners in cells_and_parts:
-        part[block] = owners[:, None]
-    for block, owners in cells_and_parts:
-        shared[block[part[block] != owners[:, None]]] = True
-    rows = [(block[shared[block]], np.repeat(owners, shared[block].sum(axis=1))) for block, owners in cells_and_parts]
-    node, part_of_node = np.unique(np.concatenate([np.stack(pair) for pair in rows], axis=1), axis=1).astype(np.intp)
-    _, lowest = np.unique(node, return_index=True)
-    part[node[lowest]] = part_of_node[lowest]
-    return part, node, part_of_node
+    nodes = np.concatenate([block.ravel() for block in mesh.solids.values()])
+    sizes = np.concatenate([np.full(len(block), block.shape[1]) for block in mesh.solids.values()])
+    n_parts = int(label.max()) + 1
+    node, part_of_node = np.divmod(np.unique(nodes.astype(np.intp) * n_parts + np.repeat(label, sizes)), n_parts)
+    first, part = np.unique(node, return_index=True)[1], np.full(mesh.n_points, -1, np.intp)
+    part[node[first]] = part_of_node[first]
+    shared = np.bincount(node)[node] > 1
+    return part, node[shared], part_of_node[shared]
 
 
 def _common_nodes(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:

@@ -99,7 +99,7 @@ def _depths(points: Array, facets: list[Array], selected: list[Mask] | None = No
     # The vector from the closest point is parallel to the normal only if this point lies in the interior of a facet.
     undecided = np.flatnonzero((np.abs(height) < 0.999 * closest.distance) & (closest.distance > ON_SURFACE * size))
     if len(undecided):
-        pieces = [nodes[:, _flat_pieces(nodes)].reshape(-1, *2 * nodes.shape[2:]) for nodes in facets]
+        pieces = [nodes[:, flat_pieces(*nodes.shape[1:])].reshape(-1, *2 * nodes.shape[2:]) for nodes in facets]
         inside[undecided] = winding_numbers(points[undecided], np.concatenate(pieces)) > 0.5
     depth = np.where(inside & (closest.distance > ON_SURFACE * size), closest.distance, 0.0)
     return depth, np.flatnonzero(np.concatenate(selected))[closest.facet]
@@ -124,9 +124,8 @@ def winding_numbers(points: Array, pieces: Array) -> Array:
     return numbers
 
 
-def _flat_pieces(nodes: Array) -> Indices:
-    """Return the local node numbers of the lines (n, 2) or triangles (n, 3) that approximate a facet with these `nodes`."""
-    n_nodes, dim = nodes.shape[1:]
+def flat_pieces(n_nodes: int, dim: int) -> Indices:
+    """Return the local nodes of the lines (n, 2) or triangles (n, 3) that approximate a facet with `n_nodes` nodes."""
     if dim == 2:
         return np.array([[0, 1]] if n_nodes == 2 else [[0, 2], [2, 1]])
     return flat_triangles(n_nodes)

@@ -79,11 +79,7 @@ class ForceDrivenObstacles:
         """Return multi-point constraints with additional columns for the obstacles."""
         if not self.pairs:
             return list(relations)
-        return [dataclasses.replace(relation, rows=self._with_empty_columns(relation.rows)) for relation in relations]
-
-    def _with_empty_columns(self, rows: csr_array) -> csr_array:
-        """Return rows with additional empty columns for the obstacles."""
-        return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
+        return [dataclasses.replace(relation, rows=self._with_columns(relation.rows, None)) for relation in relations]
 
     def supported(self, fixed: Mask) -> Mask:
         """Return the mask (n_points + n_obstacles, dim) of supported components, from the mask of the points."""
@@ -111,8 +107,6 @@ class ForceDrivenObstacles:
 
     def motions(self, motions: FreeMotions) -> FreeMotions:
         """Return the rigid-body motions including those of the obstacles, one for each component under a force."""
-        if not self.pairs:
-            return motions
         free = np.flatnonzero(self.without_stiffness)
         n_points, dim = self.shape
         names = [f"obstacle '{self.pairs[dof // dim - n_points].name}'" for dof in free.tolist()]
@@ -132,27 +126,29 @@ class ForceDrivenObstacles:
         in the step that the slip of `constraints` already includes [length].
         """
         number = self.number(name)
+        B = self._with_columns(constraints.B, number)
+        tangents = tuple(self._with_columns(tangent, number) for tangent in constraints.tangents)
         if number is None:
-            tangents = tuple(self._with_empty_columns(tangent) for tangent in constraints.tangents)
-            return dataclasses.replace(constraints, B=self._with_empty_columns(constraints.B), tangents=tangents)
-        B, normal = self._with_motion(constraints.B, number)
-        tangents = tuple(self._with_motion(tangent, number)[0] for tangent in constraints.tangents)
+            return dataclasses.replace(constraints, B=B, tangents=tangents)
         slip0 = np.zeros_like(constraints.slip0)
         if included_motion is not None and constraints.tangents:
             slip0 = constraints.slip0 + np.stack([t @ included_motion for t in constraints.directions])
-        gap0 = constraints.gap0 + normal @ position
+        gap0 = constraints.gap0 + self._directions(constraints.B) @ position
         return dataclasses.replace(constraints, B=B, gap0=gap0, tangents=tangents, slip0=slip0)
 
     def contact_stiffness(self, name: str, K: csr_array) -> csr_array:
         """Return the stiffness of pair `name` for the displacements of all obstacles, from that with its obstacle fixed."""
-        rows, number = csr_array(eye_array(K.shape[0], format="csr")), self.number(name)
-        motion = self._with_empty_columns(rows) if number is None else self._with_motion(rows, number)[0]
+        motion = self._with_columns(csr_array(eye_array(K.shape[0], format="csr")), self.number(name))
         return csr_array(motion.T @ K @ motion)
 
-    def _with_motion(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
-        """Return rows (m, n_dofs) that include the motion of an obstacle, and their directions (m, dim)."""
-        n_points, dim = self.shape
-        direction = rows @ np.tile(np.eye(dim), (n_points, 1))
-        obstacle_columns = np.zeros((rows.shape[0], len(self) * dim))
-        obstacle_columns[:, number * dim : (number + 1) * dim] = -direction
-        return csr_array(hstack([rows, csr_array(obstacle_columns)], format="csr")), direction
+    def _directions(self, rows: csr_array) -> Array:
+        """Return the sums (m, dim) of the entries of rows (m, n_dofs) over all points of the mesh."""
+        return np.asarray(rows @ np.tile(np.eye(self.shape[1]), (self.shape[0], 1)))
+
+    def _with_columns(self, rows: csr_array, number: int | None) -> csr_array:
+        """Return rows (m, n_dofs) with columns for the obstacles, which are empty except for obstacle `number`."""
+        if number is None:
+            return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
+        columns, dim = np.zeros((rows.shape[0], len(self) * self.shape[1])), self.shape[1]
+        columns[:, number * dim : (number + 1) * dim] = -self._directions(rows)
+        return csr_array(hstack([rows, csr_array(columns)], format="csr"))

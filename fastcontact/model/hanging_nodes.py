@@ -16,9 +16,9 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
-from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import bodies, outer_facets
+from fastcontact.mesh.topology import bodies, cells_of_outer_facets, outer_facets
+from fastcontact.model.body_overlap import flat_pieces
 from fastcontact.model.rigid_motions import node_at
 
 if TYPE_CHECKING:
@@ -33,22 +33,20 @@ NEAR, ON_ARC = 0.02, 0.1
 
 @record
 class OuterFacets:
-    """Outer facets of all bodies, treated as flat.
+    """Outer facets of all bodies, and the flat lines or triangles between their nodes.
 
-    `nodes` (n, k) are padded with -1, and `corners` (n, 2 or 4) with the last corner of triangles. `centre` (n, dim) is the
-    mean of the corners [length], and `normal` (n, dim) the outward unit normal. `rise` (n,) is the largest distance of the
-    other nodes from the flat facet, and `size` (n,) the diagonal of the bounding box of the corners [length]. The element
-    type is ``elements[kind]``.
+    `nodes` (n, k) are padded with -1, and `corners` (n, 2 or 4) with the last corner of triangles. `normal` (n, dim) is the
+    outward unit normal between the corners, `size` (n,) the diagonal of the bounding box of the corners [length], and `cell`
+    (n,) the solid cell of a facet. `pieces` (p, dim) are the nodes of the lines or triangles, and `facet` (p,) their facets.
     """
 
     nodes: Numbers
     corners: Numbers
-    centre: Array
     normal: Array
-    rise: Array
     size: Array
-    elements: tuple[str, ...]
-    kind: Indices
+    cell: Numbers
+    pieces: Numbers
+    facet: Indices
 
 
 def hanging_nodes_warning(model: Model) -> str:
@@ -63,7 +61,7 @@ def hanging_nodes_warning(model: Model) -> str:
     if not relevant.any():
         return ""
     node, facet = node[relevant], facet[relevant]
-    centre = ", ".join(f"{x:.6g}" for x in outer.centre[facet[0]])
+    centre = ", ".join(f"{x:.6g}" for x in mesh.points[outer.corners[facet[0]]].mean(axis=0))
     return (
         f"{len(np.unique(node))} nodes lie on facets of their own body that they do not belong to (first: "
         f"{node_at(mesh, node[0])}, on the facet around ({centre})): the body is torn there. Let cells share whole facets, "
@@ -81,54 +79,46 @@ def _paired_by_contact(mesh: Mesh, node_group: str, facet_group: str, node: Indi
 
 def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     """Return hanging nodes (m,), the facets (m,) of their own body on which they lie, and all outer facets."""
-    outer = _outer_facets(mesh)
+    outer, body = _outer_facets(mesh), bodies(mesh)[1]
     outward = np.zeros(mesh.points.shape)
     for column in outer.nodes.T:
-        is_node = column >= 0
-        np.add.at(outward, column[is_node], outer.normal[is_node])
+        np.add.at(outward, column[column >= 0], outer.normal[column >= 0])
     length = np.linalg.norm(outward, axis=1)
-    outward /= np.where(length > 0.0, length, 1.0)[:, None]
-    largest_height = ON_ARC * outer.size + outer.rise
-    nodes = np.flatnonzero(length > 0.0)
-    radius = np.linalg.norm(mesh.points[outer.corners] - outer.centre[:, None], axis=2).max(axis=1)
-    index, facet = pairs_within(mesh.points[nodes], outer.centre, radius + 2.0 * largest_height)
-    node = nodes[index]
-    height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
-    is_opposite = np.einsum("md,md->m", outer.normal[facet], outward[node]) <= -0.5
-    is_opposite &= (np.abs(height) <= largest_height[facet]) & (outer.nodes[facet] != node[:, None]).all(axis=1)
-    node, facet = node[is_opposite], facet[is_opposite]
-    order = np.lexsort((facet, node))
-    node, facet = node[order], facet[order]
-    _, body = bodies(mesh)
-    same_body = body[node] == body[outer.corners[facet, 0]]
-    node, facet = node[same_body], facet[same_body]
-    inside = _project_inside(mesh.points, node, outer, facet)
-    node, facet = node[inside], facet[inside]
-    height = np.abs(_heights(mesh, node, outer, facet)) / outer.size[facet]
-    hanging = height <= NEAR
-    on_arc = ~hanging & (height <= ON_ARC)
-    hanging[on_arc] = _closed_at_corners(outer, facet[on_arc])
-    node, facet = node[hanging], facet[hanging]
-    hanging = ~_share_cells(mesh, node, outer, facet)
+    nodes, corners = np.flatnonzero(length > 0.0), mesh.points[outer.pieces]
+    centre, reach = corners.mean(axis=1), 2.0 * ON_ARC * outer.size[outer.facet]
+    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1) + reach
+    index, piece = pairs_within(mesh.points[nodes], centre, radius)
+    node, facet = nodes[index], outer.facet[piece]
+    is_candidate = np.einsum("md,md->m", outer.normal[facet], outward[node]) <= -0.5 * length[node]
+    is_candidate &= (body[node] == body[outer.corners[facet, 0]]) & (outer.nodes[facet] != node[:, None]).all(axis=1)
+    node, piece = node[is_candidate], piece[is_candidate]
+    facet = outer.facet[piece]
+    inside, height = _projections(mesh.points[node], corners[piece])
+    height /= outer.size[facet]
+    rows = np.flatnonzero(inside & (height <= ON_ARC) & _apart_from_nodes(mesh, node, outer, facet))
+    rows = rows[np.lexsort((height[rows], facet[rows], node[rows]))]
+    rows = rows[np.unique(np.stack([node, facet])[:, rows], axis=1, return_index=True)[1]]
+    node, facet, hanging = node[rows], facet[rows], height[rows] <= NEAR
+    hanging[~hanging] = _closed_at_corners(outer, facet[~hanging])
+    hanging &= ~_share_cells(mesh, node, outer, facet)
     return node[hanging], facet[hanging], outer
 
 
-def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Array:
-    """Return the signed distances (m,) of nodes (m,) from facets (m,), which may be curved, along their normals [length]."""
-    height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
-    for kind, name in enumerate(outer.elements):
-        element, rows = elements.get(name), np.flatnonzero(outer.kind[facet] == kind)
-        if element.order == 1 or not len(rows):
-            continue
-        # xi are the reference coordinates of the projections of the nodes onto the flat facets.
-        x = mesh.points[outer.nodes[facet[rows]][:, : element.n_nodes]]
-        corners, centre = x[:, : element.n_corners], element.nodes[: element.n_corners].mean(axis=0)
-        J = np.einsum("nk,mnd->mdk", elements.get(element.linear).gradient(centre[None])[0], corners)
-        offset = np.einsum("mdk,md->mk", J, mesh.points[node[rows]] - corners.mean(axis=1))
-        xi = centre + np.linalg.solve(np.einsum("mdk,mdl->mkl", J, J), offset[..., None])[..., 0]
-        curved = np.einsum("mn,mnd->md", element.shape(xi), x)
-        height[rows] -= np.einsum("md,md->m", outer.normal[facet[rows]], curved - outer.centre[facet[rows]])
-    return np.asarray(height)
+def _projections(points: Array, x: Array) -> tuple[Mask, Array]:
+    """Return whether points (m, dim) project into lines or triangles x (m, dim, dim), within NEAR, and their distances."""
+    sides, arm = x[:, 1:] - x[:, :1], points - x[:, 0]
+    metric = np.einsum("mid,mjd->mij", sides, sides)
+    degenerate = np.linalg.det(metric) <= 0.0
+    metric[degenerate] = np.eye(metric.shape[1])
+    coordinate = np.linalg.solve(metric, np.einsum("mid,md->mi", sides, arm)[..., None])[..., 0]
+    inside = (coordinate >= -NEAR).all(axis=1) & (coordinate.sum(axis=1) <= 1.0 + NEAR) & ~degenerate
+    return inside, np.linalg.norm(arm - np.einsum("mi,mid->md", coordinate, sides), axis=1)
+
+
+def _apart_from_nodes(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
+    """Return whether nodes (m,) coincide with none of the nodes of facets (m,)."""
+    distance = np.linalg.norm(mesh.points[outer.nodes[facet]] - mesh.points[node][:, None], axis=2)
+    return np.asarray(((distance > NEAR * outer.size[facet, None]) | (outer.nodes[facet] < 0)).all(axis=1))
 
 
 def _share_cells(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
@@ -137,21 +127,20 @@ def _share_cells(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) 
     A node on the opposite side of a thin sheet belongs to such a cell. A node where two meshes meet does not, because the
     cells of the two meshes share no facet, or only the corners of the given facet.
     """
-    corners = outer.corners[facet]
-    is_involved = np.zeros(mesh.n_points, bool)
-    is_involved[node], is_involved[corners] = True, True
-    cells: dict[int, list[tuple[frozenset[int], str]]] = {}
-    for name, block in mesh.solids.items() if len(node) else ():
-        for nodes in block[is_involved[block].any(axis=1)].tolist():
-            key = frozenset(nodes[: elements.get(name).n_corners]), name
-            for number in nodes:
-                cells.setdefault(number, []).append(key)
-    connected = np.zeros(len(node), bool)
-    for k, (number, ends) in enumerate(zip(node.tolist(), corners.tolist(), strict=True)):
-        kind = outer.elements[outer.kind[facet[k]]]
-        hosts = [c for c, name in cells[ends[0]] if c.issuperset(ends) and kind in elements.get(name).facet_elements]
-        shared = [cell & neighbour for cell in hosts for neighbour, _ in cells[number]]
-        connected[k] = any(len(common) >= mesh.dim and not common.issubset(ends) for common in shared)
+    if not len(node):
+        return np.empty(0, bool)
+    corners, cells, connected = np.full((mesh.n_cells, 8), -1), [], np.zeros(len(node), bool)
+    for name, block in mesh.solids.items():
+        numbers, n_corners = mesh.offsets[name] + np.arange(len(block)), elements.get(name).n_corners
+        corners[numbers, :n_corners] = block[:, :n_corners]
+        cells.append(np.stack([block.ravel(), np.repeat(numbers, block.shape[1])]))
+    ends = np.concatenate(cells, axis=1)
+    around = csr_array((np.ones(ends.shape[1], bool), tuple(ends)), shape=(mesh.n_points, mesh.n_cells))[node]
+    pair = np.repeat(np.arange(len(node)), np.diff(around.indptr))
+    behind = corners[outer.cell[facet[pair]]]
+    common = (behind[:, :, None] == corners[around.indices][:, None]).any(axis=2) & (behind >= 0)
+    on_facet = (behind[:, :, None] == outer.corners[facet[pair]][:, None]).any(axis=2)
+    connected[pair[(common.sum(axis=1) >= mesh.dim) & (common & ~on_facet).any(axis=1)]] = True
     return connected
 
 
@@ -175,51 +164,21 @@ def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
 
 def _outer_facets(mesh: Mesh) -> OuterFacets:
     """Return the outer facets of all bodies."""
-    facets, n_corners = outer_facets(mesh), 2 if mesh.dim == 2 else 4
+    facets, n_corners, first = outer_facets(mesh), 2 if mesh.dim == 2 else 4, 0
     width = max(block.shape[1] for block in facets.values())
-    nodes, corners, centres, rises = [], [], [], []
+    nodes, corners, pieces, numbers = [], [], [], []
     for name, block in facets.items():
-        element, x = elements.get(name), mesh.points[block]
         nodes.append(np.pad(block, ((0, 0), (0, width - block.shape[1])), constant_values=-1))
-        corners.append(block[:, np.minimum(np.arange(n_corners), element.n_corners - 1)])
-        centres.append(x[:, : element.n_corners].mean(axis=1))
-        rises.append(_rise(element, x))
+        corners.append(block[:, np.minimum(np.arange(n_corners), elements.get(name).n_corners - 1)])
+        local = flat_pieces(block.shape[1], mesh.dim)
+        pieces.append(block[:, local].reshape(-1, mesh.dim))
+        numbers.append(first + np.repeat(np.arange(len(block)), len(local)))
+        first += len(block)
     corner = np.concatenate(corners)
     x = mesh.points[corner]
     normal = flat_area_vectors(x)
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
-    size = np.linalg.norm(np.ptp(x, axis=1), axis=1)
-    kind = np.repeat(np.arange(len(facets)), [len(block) for block in facets.values()])
-    centre, rise = np.concatenate(centres), np.concatenate(rises)
-    return OuterFacets(np.concatenate(nodes), corner, centre, normal, rise, size, tuple(facets), kind)
-
-
-def _rise(element: Element, x: Array) -> Array:
-    """Return the largest distances (n,) of the nodes of facets `x` (n, n_nodes, dim) from those of flat facets [length]."""
-    if element.order == 1:
-        return np.zeros(len(x))
-    flat = elements.get(element.linear).shape(element.nodes) @ x[:, : element.n_corners]
-    return np.asarray(np.linalg.norm(x - flat, axis=2).max(axis=1))
-
-
-def _project_inside(points: Array, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
-    """Return whether nodes (m,) project onto facets (m,) and coincide with none of their nodes."""
-    members, size = outer.nodes[facet], outer.size[facet]
-    distance = np.linalg.norm(points[members] - points[node][:, None], axis=2)
-    distinct = (np.where(members >= 0, distance, np.inf) > NEAR * size[:, None]).all(axis=1)
-    x, point = points[outer.corners[facet]], points[node]
-    if points.shape[1] == 2:
-        return np.asarray(distinct & _in_simplex(point, x))
-    return np.asarray(distinct & (_in_simplex(point, x[:, [0, 1, 2]]) | _in_simplex(point, x[:, [0, 2, 3]])))
-
-
-def _in_simplex(point: Array, x: Array) -> Mask:
-    """Return whether the projections of points (m, dim) lie in lines (m, 2, dim) or triangles (m, 3, dim), within NEAR."""
-    sides = x[:, 1:] - x[:, :1]
-    metric = np.einsum("mid,mjd->mij", sides, sides)
-    degenerate = np.linalg.det(metric) <= 0.0
-    metric[degenerate] = np.eye(metric.shape[1])
-    coordinate = np.linalg.solve(metric, np.einsum("mid,md->mi", sides, point - x[:, 0])[..., None])[..., 0]
-    inside = (coordinate >= -NEAR).all(axis=1) & (coordinate.sum(axis=1) <= 1.0 + NEAR)
-    return np.asarray(inside & ~degenerate)
+    size, cell = np.linalg.norm(np.ptp(x, axis=1), axis=1), np.concatenate([*cells_of_outer_facets(mesh).values()])
+    flat = np.concatenate(pieces), np.concatenate(numbers)
+    return OuterFacets(np.concatenate(nodes), corner, normal, size, cell, *flat)

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array
+from fastcontact.arrays import AnyArray, Array
 
-Function = Callable[[Array], Array]
-# Nodes, shape functions and their derivatives.
-Functions = tuple[Array, Function, Function]
+Function = Callable[[AnyArray], AnyArray]
+# Nodes and shape functions.
+Functions = tuple[Array, Function]
+# Length of the complex steps of derivatives, a power of two, so that it causes no round-off.
+STEP = 2.0**-100
 
 # Element types of facets by the dimension of the cell and the number of nodes of the facet.
 _FACETS = {
@@ -38,9 +40,8 @@ class Element:
     facets : tuple of tuple of int
         Local nodes of each boundary facet, oriented so that its normal points outward.
     shape : callable
-        ``shape(xi)`` maps (m, dim) to values (m, n_nodes) [-].
-    gradient : callable
-        ``gradient(xi)`` maps (m, dim) to derivatives (m, n_nodes, dim) [-].
+        ``shape(xi)`` maps (m, dim) to values (m, n_nodes) [-]. It must be an analytic function, which is also evaluated
+        at complex coordinates; see `gradient`.
     quadrature : (ndarray (n_q, dim), ndarray (n_q,))
         Default quadrature points and weights of the stiffness [-].
     meshio, med : str
@@ -61,7 +62,6 @@ class Element:
     edges: tuple[tuple[int, int], ...]
     facets: tuple[tuple[int, ...], ...]
     shape: Function
-    gradient: Function
     quadrature: tuple[Array, Array]
     meshio: str
     med: str
@@ -69,6 +69,15 @@ class Element:
     quadratic: str
     dilatation: int | None = None
     corner_element: Element | None = None
+
+    def gradient(self, xi: Array) -> Array:
+        """Return the derivatives (m, n_nodes, dim) [-] of the shape functions at `xi` (m, dim) [-].
+
+        They are the imaginary parts of the shape functions after a small imaginary step, divided by the step, which are
+        exact to round-off (W. Squire and G. Trapp, SIAM Review 40, 1998).
+        """
+        derivatives = [self.shape(xi + step).imag for step in 1j * STEP * np.eye(self.dim)]
+        return np.ascontiguousarray(np.stack(derivatives, axis=2) / STEP)
 
     @property
     def linear(self) -> str:
@@ -119,11 +128,7 @@ class Element:
     def tables(self) -> tuple[Array, Array, Array]:
         """Shape functions (n_q, n_nodes), derivatives (n_q, n_nodes, dim) and weights (n_q,) at quadrature points [-]."""
         points, weights = self.quadrature
-        return (
-            np.ascontiguousarray(self.shape(points)),
-            np.ascontiguousarray(self.gradient(points)),
-            np.ascontiguousarray(weights),
-        )
+        return np.ascontiguousarray(self.shape(points)), self.gradient(points), np.ascontiguousarray(weights)
 
     @cached_property
     def extrapolation(self) -> Array:
@@ -142,10 +147,9 @@ class Element:
 def quadratic(name: str, linear: Element, functions: Functions, **arguments: Any) -> Element:
     """Return a quadratic element, whose facets are those of the `linear` element with their mid-side and centre nodes.
 
-    `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions and their derivatives, and `arguments` are
-    further arguments of `Element`.
+    `functions` are its nodes (n_nodes, dim) [-] and its shape functions, and `arguments` are further arguments of `Element`.
     """
-    nodes, shape, gradient = functions
+    nodes, shape = functions
     facets = []
     for facet in linear.facets:
         corners = nodes[list(facet)]
@@ -153,7 +157,7 @@ def quadratic(name: str, linear: Element, functions: Functions, **arguments: Any
         on_facet = [np.flatnonzero((nodes == node).all(axis=1)) for node in (*midpoints, corners.mean(axis=0))]
         facets.append(tuple(dict.fromkeys((*facet, *np.concatenate(on_facet).tolist()))))
     arguments |= {"quadratic": name, "corner_element": linear}
-    return Element(name, nodes, linear.edges, tuple(facets), shape, gradient, **arguments)
+    return Element(name, nodes, linear.edges, tuple(facets), shape, **arguments)
 
 
 def with_midpoints(linear: Element) -> Array:
@@ -162,7 +166,7 @@ def with_midpoints(linear: Element) -> Array:
 
 
 def serendipity(box: Element) -> Functions:
-    """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a serendipity square or cube.
+    """Return nodes (n_nodes, dim) [-] and shape functions of a serendipity square or cube.
 
     The function of a mid-side node with the coordinates X is the product of 1 - x^2 for the coordinate x along its edge,
     where X is 0, and of (1 + x X) / 2 for the other coordinates. The function of a corner is its linear function times
@@ -171,26 +175,16 @@ def serendipity(box: Element) -> Functions:
     nodes, dim = with_midpoints(box), box.dim
     corners, midpoints = np.split(nodes, [box.n_nodes])
 
-    def factors(xi: Array) -> Array:
-        x = xi[:, None]
-        return np.where(midpoints == 0, 1 - x * x, (1 + x * midpoints) / 2)
+    def shape(xi: AnyArray) -> AnyArray:
+        corner, x = box.shape(xi) * (xi @ corners.T - (dim - 1)), xi[:, None]
+        factors = np.where(midpoints == 0, 1 - x * x, (1 + x * midpoints) / 2)
+        return np.column_stack([corner, factors.prod(axis=2)])
 
-    def shape(xi: Array) -> Array:
-        corner = box.shape(xi) * (xi @ corners.T - (dim - 1))
-        return np.column_stack([corner, factors(xi).prod(axis=2)])
-
-    def gradient(xi: Array) -> Array:
-        excess = (xi @ corners.T - (dim - 1))[:, :, None]
-        corner = box.gradient(xi) * excess + box.shape(xi)[:, :, None] * corners
-        slopes = np.where(midpoints == 0, -2 * xi[:, None], midpoints / 2)
-        derivatives = [np.where(np.arange(dim) == k, slopes, factors(xi)).prod(axis=2) for k in range(dim)]
-        return np.concatenate([corner, np.stack(derivatives, axis=2)], axis=1)
-
-    return nodes, shape, gradient
+    return nodes, shape
 
 
 def product(nodes: Array, first: Element, second: Element) -> Functions:
-    """Return nodes, shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of the product of two elements.
+    """Return nodes (n_nodes, dim) [-] and shape functions (m, n_nodes) [-] of the product of two elements.
 
     The function of each of the `nodes` (n_nodes, dim) [-] is the product of two functions: that of the node of the first
     element with the first coordinates, and that of the node of the second element with the other coordinates.
@@ -199,29 +193,18 @@ def product(nodes: Array, first: Element, second: Element) -> Functions:
     I = np.abs(nodes[:, None, :split] - first.nodes).sum(axis=2).argmin(axis=1)  # noqa: E741
     J = np.abs(nodes[:, None, split:] - second.nodes).sum(axis=2).argmin(axis=1)
 
-    def shape(xi: Array) -> Array:
+    def shape(xi: AnyArray) -> AnyArray:
         return np.asarray(first.shape(xi[:, :split])[:, I] * second.shape(xi[:, split:])[:, J])
 
-    def gradient(xi: Array) -> Array:
-        x, y = xi[:, :split], xi[:, split:]
-        along_first = first.gradient(x)[:, I] * second.shape(y)[:, J, None]
-        along_second = first.shape(x)[:, I, None] * second.gradient(y)[:, J]
-        return np.concatenate([along_first, along_second], axis=2)
-
-    return nodes, shape, gradient
+    return nodes, shape
 
 
 def quadratic_simplex(simplex: Element) -> Functions:
-    """Return the nodes (n_nodes, dim) [-], shape functions and derivatives of the quadratic simplex with mid-side nodes."""
+    """Return the nodes (n_nodes, dim) [-] and shape functions of the quadratic simplex with mid-side nodes."""
     first, second = np.array(simplex.edges).T
 
-    def shape(xi: Array) -> Array:
+    def shape(xi: AnyArray) -> AnyArray:
         L = simplex.shape(xi)
         return np.column_stack([L * (2 * L - 1), 4 * L[:, first] * L[:, second]])
 
-    def gradient(xi: Array) -> Array:
-        L, dL = simplex.shape(xi)[:, :, None], simplex.gradient(xi)
-        along_edges = 4 * (L[:, first] * dL[:, second] + L[:, second] * dL[:, first])
-        return np.concatenate([(4 * L - 1) * dL, along_edges], axis=1)
-
-    return with_midpoints(simplex), shape, gradient
+    return with_midpoints(simplex), shape

@@ -14,13 +14,13 @@ from fastcontact.mesh.quadrature import gauss_cube
 
 NODES = np.column_stack([np.tile(QUAD4.nodes, (2, 1)), np.repeat([-1.0, 1.0], 4)])
 CENTRES = np.array([[-1.0, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1], [0, 0, 0]])
-_, shape, gradient = product(NODES, QUAD4, LINE2)
+_, shape = product(NODES, QUAD4, LINE2)
 
 HEX8 = Element(
     "hex8", NODES,
     edges=((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)),
     facets=((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)), shape=shape,
-    gradient=gradient, quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12, quadratic="hex20", dilatation=0,
+    quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12, quadratic="hex20", dilatation=0,
 )  # fmt: skip
 HEX20 = quadratic(
     "hex20", HEX8, serendipity(HEX8), quadrature=gauss_cube(3), meshio="hexahedron20", med="H20", vtk=25, dilatation=1

@@ -2,38 +2,27 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, quadratic, with_midpoints
+from fastcontact.mesh.elements._element import AnyArray, Element, quadratic, with_midpoints
 from fastcontact.mesh.quadrature import gauss_line
 
 
-def shape(xi: Array) -> Array:
+def shape(xi: AnyArray) -> AnyArray:
     """Return the shape functions (m, 2) [-] of the linear line at `xi` (m, 1) [-]."""
     s = xi[:, 0]
     return np.stack([(1 - s) / 2, (1 + s) / 2], axis=1)
 
 
-def gradient(xi: Array) -> Array:
-    """Return the derivatives (m, 2, 1) [-] of the linear line at `xi` (m, 1) [-]."""
-    return np.broadcast_to(np.array([[-0.5], [0.5]]), (len(xi), 2, 1)).copy()
-
-
-def shape_3(xi: Array) -> Array:
+def shape_3(xi: AnyArray) -> AnyArray:
     """Return the shape functions (m, 3) [-] of the quadratic line at `xi` (m, 1) [-]."""
     s = xi[:, 0]
     return np.stack([s * (s - 1) / 2, s * (s + 1) / 2, 1 - s * s], axis=1)
 
 
-def gradient_3(xi: Array) -> Array:
-    """Return the derivatives (m, 3, 1) [-] of the quadratic line at `xi` (m, 1) [-]."""
-    s = xi[:, 0]
-    return np.stack([s - 0.5, s + 0.5, -2 * s], axis=1)[:, :, None]
-
-
 LINE2 = Element(
-    "line2", np.array([[-1.0], [1.0]]), edges=((0, 1),), facets=((0,), (1,)), shape=shape, gradient=gradient,
-    quadrature=gauss_line(2), meshio="line", med="SE2", vtk=3, quadratic="line3",
+    "line2", np.array([[-1.0], [1.0]]), edges=((0, 1),), facets=((0,), (1,)), shape=shape, quadrature=gauss_line(2),
+    meshio="line", med="SE2", vtk=3, quadratic="line3",
 )  # fmt: skip
 LINE3 = quadratic(
-    "line3", LINE2, (with_midpoints(LINE2), shape_3, gradient_3), quadrature=gauss_line(3), meshio="line3", med="SE3", vtk=21
+    "line3", LINE2, (with_midpoints(LINE2), shape_3), quadrature=gauss_line(3), meshio="line3", med="SE3", vtk=21
 )  # fmt: skip
 ELEMENTS = LINE2, LINE3

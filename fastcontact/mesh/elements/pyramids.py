@@ -9,47 +9,39 @@ test is passed. The rule of code_aster has 10 points.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, quadratic, with_midpoints
+from fastcontact.mesh.elements._element import AnyArray, Element, quadratic, with_midpoints
 from fastcontact.mesh.elements.quadrangles import EDGES, QUAD4
 from fastcontact.mesh.quadrature import conical_pyramid, pyramid_5
 
 X, Y = QUAD4.nodes.T
+# Distance from the apex at which functions at the apex are evaluated, to avoid a division by zero [-].
+BELOW_APEX = 1e-18
 
 
-def collapsed_coordinates(xi: Array) -> tuple[Array, Array, Array]:
-    """Return a = x / (1 - z), b = y / (1 - z) and 1 - z, each (m, 1) [-], at `xi` (m, 3) [-]; a = b = 0 at the apex."""
+def collapsed_coordinates(xi: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray]:
+    """Return a = x / (1 - z), b = y / (1 - z) and 1 - z, each (m, 1) [-], at `xi` (m, 3) [-]."""
     x, y, t = xi[:, 0:1], xi[:, 1:2], 1 - xi[:, 2:3]
-    apex = np.abs(t) < 1e-14
-    height = np.where(apex, 1.0, t)
-    return np.where(apex, 0.0, x / height), np.where(apex, 0.0, y / height), t
+    t = np.where(np.abs(t) < 1e-14, t + BELOW_APEX, t)
+    return x / t, y / t, t
 
 
-def shape(xi: Array) -> Array:
+def shape(xi: AnyArray) -> AnyArray:
     """Return the shape functions (m, 5) [-] at `xi` (m, 3) [-]."""
     a, b, t = collapsed_coordinates(xi)
     return np.column_stack([t * (1 + X * a) * (1 + Y * b) / 4, xi[:, 2]])
 
 
-def gradient(xi: Array) -> Array:
-    """Return the derivatives (m, 5, 3) [-] at `xi` (m, 3) [-]."""
-    a, b, _ = collapsed_coordinates(xi)
-    base = np.stack([X * (1 + Y * b), Y * (1 + X * a), X * Y * a * b - 1], axis=2) / 4
-    apex = np.tile([0.0, 0.0, 1.0], (len(xi), 1, 1))
-    return np.concatenate([base, apex], axis=1)
-
-
 PYRAMID5 = Element(
     "pyramid5", np.vstack([np.column_stack([QUAD4.nodes, np.zeros(4)]), [[0.0, 0.0, 1.0]]]),
     edges=(*EDGES, (0, 4), (1, 4), (2, 4), (3, 4)), facets=((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
-    shape=shape, gradient=gradient, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, quadratic="pyramid13",
-    dilatation=0,
+    shape=shape, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, quadratic="pyramid13", dilatation=0,
 )  # fmt: skip
 # The edges of the base are parallel to x at y = -1, to y at x = 1, to x at y = 1 and to y at x = -1.
 SIDES = np.array([-1.0, 1.0, 1.0, -1.0])
 ALONG_X = np.array([True, False, True, False])
 
 
-def shape_13(xi: Array) -> Array:
+def shape_13(xi: AnyArray) -> AnyArray:
     """Return the shape functions (m, 13) [-] at `xi` (m, 3) [-]."""
     (a, b, t), z = collapsed_coordinates(xi), xi[:, 2:3]
     corner = shape(xi)[:, :4] * (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)
@@ -57,30 +49,8 @@ def shape_13(xi: Array) -> Array:
     return np.column_stack([corner, z * (2 * z - 1), base, 4 * z * shape(xi)[:, :4]])
 
 
-def gradient_13(xi: Array) -> Array:
-    """Return the derivatives (m, 13, 3) [-] at `xi` (m, 3) [-]."""
-    (a, b, t), z = collapsed_coordinates(xi), xi[:, 2:3]
-    N, dN = shape(xi)[:, :4, None], gradient(xi)[:, :4]
-    factor = (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)[:, :, None]
-    corner = dN * factor + N * np.column_stack([X, Y, np.zeros(4)])
-    apex = np.zeros((len(xi), 1, 3))
-    apex[:, 0, 2] = 4 * z[:, 0] - 1
-    base = np.where(ALONG_X[:, None], _base_edges(a, b, t, (0, 1)), _base_edges(b, a, t, (1, 0)))
-    apex_edges = 4 * (dN * z[:, :, None] + N * np.array([0.0, 0.0, 1.0]))
-    return np.concatenate([corner, apex, base, apex_edges], axis=1)
-
-
-def _base_edges(a: Array, b: Array, t: Array, axes: tuple[int, int]) -> Array:
-    """Return the derivatives (m, 4, 3) of t^2 (1 - a^2) (1 + S b) / 2 for all S in SIDES; `axes` are those of a and b."""
-    derivatives = np.empty((len(a), 4, 3))
-    derivatives[:, :, axes[0]] = -a * t * (1 + SIDES * b)
-    derivatives[:, :, axes[1]] = t * (1 - a * a) * SIDES / 2
-    derivatives[:, :, 2] = (1 - a * a) * t * SIDES * b / 2 - t * (1 + SIDES * b)
-    return derivatives
-
-
 PYRAMID13 = quadratic(
-    "pyramid13", PYRAMID5, (with_midpoints(PYRAMID5), shape_13, gradient_13), quadrature=conical_pyramid(3),
+    "pyramid13", PYRAMID5, (with_midpoints(PYRAMID5), shape_13), quadrature=conical_pyramid(3),
     meshio="pyramid13", med="P13", vtk=27, dilatation=0,
 )  # fmt: skip
 ELEMENTS = PYRAMID13, PYRAMID5

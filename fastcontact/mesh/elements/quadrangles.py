@@ -12,11 +12,11 @@ from fastcontact.mesh.quadrature import gauss_square
 
 NODES = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
-_, shape, gradient = product(NODES, LINE2, LINE2)
+_, shape = product(NODES, LINE2, LINE2)
 
 QUAD4 = Element(
-    "quad4", NODES, EDGES, facets=EDGES, shape=shape, gradient=gradient, quadrature=gauss_square(2), meshio="quad",
-    med="QU4", vtk=9, quadratic="quad8", dilatation=0,
+    "quad4", NODES, EDGES, facets=EDGES, shape=shape, quadrature=gauss_square(2), meshio="quad", med="QU4",
+    vtk=9, quadratic="quad8", dilatation=0,
 )  # fmt: skip
 QUAD8 = quadratic(
     "quad8", QUAD4, serendipity(QUAD4), quadrature=gauss_square(3), meshio="quad8", med="QU8", vtk=23, dilatation=1

@@ -6,23 +6,18 @@ quadratic elements five.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, quadratic, quadratic_simplex
+from fastcontact.mesh.elements._element import AnyArray, Element, quadratic, quadratic_simplex
 from fastcontact.mesh.quadrature import tetrahedron_1, tetrahedron_5
 
 
-def shape(xi: Array) -> Array:
+def shape(xi: AnyArray) -> AnyArray:
     """Return the shape functions (m, 4) [-] at `xi` (m, 3) [-], which are the barycentric coordinates."""
     return np.column_stack([1 - xi.sum(axis=1), xi])
 
 
-def gradient(xi: Array) -> Array:
-    """Return the derivatives (m, 4, 3) [-] at `xi` (m, 3) [-]."""
-    return np.tile(np.vstack([-np.ones(3), np.eye(3)]), (len(xi), 1, 1))
-
-
 TET4 = Element(
     "tet4", np.vstack([np.zeros(3), np.eye(3)]), edges=((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    facets=((0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)), shape=shape, gradient=gradient, quadrature=tetrahedron_1(),
+    facets=((0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)), shape=shape, quadrature=tetrahedron_1(),
     meshio="tetra", med="TE4", vtk=10, quadratic="tet10",
 )  # fmt: skip
 TET10 = quadratic(

@@ -6,27 +6,22 @@ elements six, because three points do not suffice at an axis of symmetry.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element, quadratic, quadratic_simplex
-from fastcontact.mesh.quadrature import triangle_1, triangle_6
+from fastcontact.mesh.elements._element import AnyArray, Element, quadratic, quadratic_simplex
+from fastcontact.mesh.quadrature import triangle
 
 EDGES = ((0, 1), (1, 2), (2, 0))
 
 
-def shape(xi: Array) -> Array:
+def shape(xi: AnyArray) -> AnyArray:
     """Return the shape functions (m, 3) [-] at `xi` (m, 2) [-]."""
     return np.stack([1 - xi[:, 0] - xi[:, 1], xi[:, 0], xi[:, 1]], axis=1)
 
 
-def gradient(xi: Array) -> Array:
-    """Return the derivatives (m, 3, 2) [-] at `xi` (m, 2) [-]."""
-    return np.broadcast_to(np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]), (len(xi), 3, 2)).copy()
-
-
 TRI3 = Element(
-    "tri3", np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), EDGES, facets=EDGES, shape=shape, gradient=gradient,
-    quadrature=triangle_1(), meshio="triangle", med="TR3", vtk=5, quadratic="tri6",
+    "tri3", np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), EDGES, facets=EDGES, shape=shape,
+    quadrature=triangle(1), meshio="triangle", med="TR3", vtk=5, quadratic="tri6",
 )  # fmt: skip
 TRI6 = quadratic(
-    "tri6", TRI3, quadratic_simplex(TRI3), quadrature=triangle_6(), meshio="triangle6", med="TR6", vtk=22, dilatation=0
+    "tri6", TRI3, quadratic_simplex(TRI3), quadrature=triangle(4), meshio="triangle6", med="TR6", vtk=22, dilatation=0
 )
 ELEMENTS = TRI3, TRI6

@@ -51,7 +51,8 @@ def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, di
     # Version 2 of Gmsh's format repeats a cell for each of its groups.
     is_gmsh, blocks = file_format == "gmsh", _blocks(content, NODE_ORDER.get(file_format, {}))
     names = _cell_group_names(content, file_format)
-    return build_mesh(content["points"], blocks, _point_groups(content), names, repeats=is_gmsh)
+    point_groups = _groups(content["point_data"], content["point_sets"], POINT_PREFIX, 0, {})
+    return build_mesh(content["points"], blocks, point_groups, names, repeats=is_gmsh)
 
 
 def _cell_group_names(content: Mapping[str, Any], file_format: str) -> list[str]:
@@ -77,23 +78,32 @@ def _block(content: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, o
     """Return the cells of block number `index` with their groups, in the node order of this package."""
     kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
-    groups: dict[str, AnyArray] = {}
-    for key, arrays in content["cell_data"].items():
-        if key in TAGS:
-            _add_to(groups, _groups_of_tags(arrays[index], dim, content["field_data"]))
-        else:
-            _add_to(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(arrays[index])})
-    for name, sets in content["cell_sets"].items():
-        if not name.startswith("gmsh:") and index < len(sets):
-            _add_to(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
+    arrays = {key: blocks[index] for key, blocks in content["cell_data"].items()}
+    sets = {k: v[index] for k, v in content["cell_sets"].items() if not k.startswith("gmsh:") and index < len(v)}
+    groups = _groups(arrays, sets, CELL_PREFIX, dim, content["field_data"])
     nodes = nodes[:, order[kind]] if kind in order else nodes
     return Block(kind, nodes, {name: rows for name, rows in groups.items() if len(rows)})
 
 
-def _add_to(groups: dict[str, AnyArray], additions: Mapping[str, AnyArray]) -> None:
-    """Add the groups `additions` to `groups` in place; a group of the same name becomes the union of both."""
-    for name, rows in additions.items():
+def _groups(
+    arrays: Mapping[str, AnyArray], sets: Mapping[str, Any], prefix: str, dim: int, field_data: Mapping[str, Any]
+) -> Groups:
+    """Return the groups of cells or points that arrays and sets define; groups of the same name are united.
+
+    Arrays contain tags of entities of dimension `dim`, see `_groups_of_tags`, or they have names with the given `prefix` and
+    are nonzero in a group.
+    """
+    parts = [
+        _groups_of_tags(values, dim, field_data)
+        if key in TAGS
+        else {unquote(key[len(prefix) :]): np.flatnonzero(values)}
+        for key, values in arrays.items()
+    ]
+    parts += [{name: np.asarray(members, np.intp).reshape(-1)} for name, members in sets.items()]
+    groups: Groups = {}
+    for name, rows in (item for part in parts for item in part.items()):
         groups[name] = np.union1d(groups[name], rows) if name in groups else rows
+    return groups
 
 
 def _groups_of_tags(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str, AnyArray]:
@@ -103,19 +113,6 @@ def _groups_of_tags(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> 
     names = {(int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2}
     groups = {tag: names.get((tag, dim), f"{SHAPES[dim]}_{tag}") for tag in np.unique(tags).tolist() if tag}
     return {name: np.flatnonzero(tags == tag) for tag, name in groups.items()}
-
-
-def _point_groups(content: Mapping[str, Any]) -> dict[str, AnyArray]:
-    """Return the groups of points from arrays and sets of meshio."""
-    groups: dict[str, AnyArray] = {}
-    for key, data in content["point_data"].items():
-        if key in TAGS:
-            _add_to(groups, _groups_of_tags(data, 0, {}))
-        else:
-            _add_to(groups, {unquote(key[len(POINT_PREFIX) :]): np.flatnonzero(data)})
-    for name, members in content["point_sets"].items():
-        _add_to(groups, {name: np.asarray(members, np.intp).reshape(-1)})
-    return groups
 
 
 @record

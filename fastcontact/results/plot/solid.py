@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.neighbours import pairs_within
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
@@ -19,7 +20,7 @@ ON_TRIANGLE = 1e-4
 
 
 class Screen:
-    """Triangles sorted by the squares of the screen that they overlap, to test whether they hide points.
+    """Triangles in the coordinates of the screen, to test whether they hide points.
 
     Parameters
     ----------
@@ -31,55 +32,29 @@ class Screen:
 
     def __init__(self, triangles: Array, eye: Array) -> None:
         self.axes = screen_axes(eye)
-        flat = triangles @ self.axes.T
-        self.corners, self.origin = flat[..., :2], flat[..., :2].reshape(-1, 2).min(axis=0)
-        self.depth = flat[..., 2]
-        size = np.ptp(flat.reshape(-1, 3), axis=0).max()
-        self.tolerance = ON_TRIANGLE * size
-        self.n_bins = int(np.clip(np.sqrt(len(flat)), 1, 256))
-        self.bin = 1.0001 * max(np.ptp(flat[..., :2].reshape(-1, 2), axis=0).max(), 1e-300) / self.n_bins
-        self._sort()
-
-    def _sort(self) -> None:
-        """List the triangles of each square of the screen, in the order of the squares."""
-        low, high = self._square(self.corners.min(axis=1)), self._square(self.corners.max(axis=1))
-        n_columns, n_rows = (high - low + 1).T
-        number, within = _entry_members(n_columns * n_rows)
-        column, row = within % n_columns[number], within // n_columns[number]
-        square = (low[number, 0] + column) * self.n_bins + low[number, 1] + row
-        order = np.argsort(square, kind="stable")
-        self.members = number[order]
-        self.starts = np.searchsorted(square[order], np.arange(self.n_bins**2 + 1))
-
-    def _square(self, points: Array) -> Indices:
-        """Return the column and the row (n, 2) of the squares that contain screen points (n, 2)."""
-        return np.clip(((points - self.origin) / self.bin).astype(np.int64), 0, self.n_bins - 1)
+        self.corners = triangles @ self.axes.T
+        self.tolerance = ON_TRIANGLE * np.ptp(self.corners.reshape(-1, 3), axis=0).max()
+        middle = 0.5 * (self.corners.min(axis=1) + self.corners.max(axis=1))
+        self.centre, arms = middle[:, :2], self.corners - middle[:, None]
+        self.radius = np.linalg.norm(arms[..., :2], axis=2).max(axis=1)
 
     def hidden(self, positions: Array) -> Mask:
         """Return whether each position (..., 3) [length] is hidden behind a triangle."""
         flat = positions.reshape(-1, 3) @ self.axes.T
-        column, row = self._square(flat[:, :2]).T
-        square = column * self.n_bins + row
-        first, count = self.starts[square], self.starts[square + 1] - self.starts[square]
-        index, within = _entry_members(count)
-        triangle = self.members[first[index] + within]
-        behind = self._behind(flat[index], triangle)
-        return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(positions.shape[:-1]))
+        point, triangle = pairs_within(flat[:, :2], self.centre, self.radius)
+        hidden = np.zeros(len(flat), bool)
+        hidden[point[self._behind(flat[point], self.corners[triangle])]] = True
+        return hidden.reshape(positions.shape[:-1])
 
-    def _behind(self, flat: Array, triangle: Indices) -> Mask:
-        """Return whether each point (n, 3) in screen coordinates [length] lies behind its triangle (n,)."""
-        a, b, c = np.moveaxis(self.corners[triangle], 1, 0)
+    def _behind(self, points: Array, triangles: Array) -> Mask:
+        """Return whether points (n, 3) lie behind triangles (n, 3, 3), all in the coordinates of the screen [length]."""
+        a, b, c = np.moveaxis(triangles[..., :2], 1, 0)
         area = _cross(b - a, c - a)
         area = np.where(area == 0.0, np.inf, area)
-        p = flat[:, :2]
+        p = points[:, :2]
         weights = np.stack([_cross(b - p, c - p), _cross(c - p, a - p), _cross(a - p, b - p)], axis=1) / area[:, None]
-        depth = (weights * self.depth[triangle]).sum(axis=1)
-        return np.asarray((weights > 0.0).all(axis=1) & (depth > flat[:, 2] + self.tolerance))
-
-
-def _entry_members(count: Indices) -> tuple[Indices, Indices]:
-    """Return the entry of each member, and the number of the member within its entry, if entry i has ``count[i]`` members."""
-    return np.repeat(np.arange(len(count)), count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        depth = (weights * triangles[..., 2]).sum(axis=1)
+        return np.asarray((weights > 0.0).all(axis=1) & (depth > points[:, 2] + self.tolerance))
 
 
 def screen_axes(eye: Array) -> Array:
