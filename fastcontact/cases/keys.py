@@ -17,11 +17,14 @@ NUMBER = (int, float)
 _ARGUMENT = re.compile(r"the argument (?P<key>\w+) of [\w.]+ must be (?P<kinds>.*), not (?P<given>.*)")
 # Words for types in messages about arguments, and the corresponding words for values in TOML.
 _TOML_WORDS = {
-    "a sequence of": "a list of", "an array of": "a list of", "sequences of two": "pairs", "True or False": "true or false",
-    " or a function": "", " or None": "",
-}  # fmt: skip
+    "a sequence of": "a list of",
+    "an array of": "a list of",
+    "sequences of two": "pairs",
+    "a dictionary": "a table",
+    "True or False": "true or false",
+    **dict.fromkeys((" or a function", " or None"), ""),
+}
 # Keys of the tables of a case file, with the TOML types of their values.
-AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
 SOLVE: dict[str, Any] = {
@@ -31,8 +34,6 @@ SOLVE: dict[str, Any] = {
 }
 # Keys of a rigid surface that consists of the facets of a group, in a file or in the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
-# Keys of the rotation of a rigid obstacle or a support.
-ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
 SENSITIVITY: dict[str, Any] = {"quantity": list, "by": list}
 FIELD: dict[str, Any] = {"file": str, "field": str, "over": str, "instant": NUMBER}
 # Settings of studies of the case, which `fastcontact.studies.settings` reads.

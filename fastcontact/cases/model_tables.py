@@ -287,9 +287,6 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     if shape == "mesh":  # then the arguments of the shape are keys of the obstacle
         shape = {"kind": "mesh", **{key: options.pop(key) for key in keys.SURFACE if key in options}}
     obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
-    for key in ("motion", "force"):
-        if key in options:
-            check_keys(f"{where}.{key}", options[key], keys.AXES)
     with errors_at(where):
         model.add_obstacle(name, obstacle=obstacle, **_arguments(where, options))
 
@@ -308,11 +305,9 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
     arguments: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in shape.items() if k != "kind"}
     if kind == "mesh":
         check_keys(where, arguments, keys.SURFACE)
-        if "group" not in arguments:
-            raise CaseError(f"'{where}' needs 'group', the facets of the rigid surface")
         file = arguments.pop("file", None)
-        return MeshedSurface(mesh if file is None else read_mesh(folder / file), **arguments)
-    obstacle: Obstacle = call_with_keys(where, SHAPES[kind], arguments)
+        arguments["mesh"] = mesh if file is None else read_mesh(folder / file)
+    obstacle: Obstacle = call_with_keys(where, MeshedSurface if kind == "mesh" else SHAPES[kind], arguments)
     return obstacle
 
 
@@ -324,8 +319,7 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     arguments = {key: value for key, value in entry.items() if key != "place"}  # `_add_references` has read the place
     if isinstance(entry.get("axes"), dict):
         arguments["axes"] = call_with_keys(f"{where}.axes", CylindricalAxes, entry["axes"])
-    if "rotation" in entry:
-        check_keys(f"{where}.rotation", entry["rotation"], keys.ROTATION)
+    if isinstance(entry.get("rotation"), dict):
         arguments["rotation"] = _arguments(f"{where}.rotation", entry["rotation"])
     if "ramp" in entry:
         arguments["ramp"] = ramp_points(entry["ramp"], f"{where}.ramp")

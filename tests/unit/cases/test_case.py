@@ -203,7 +203,7 @@ MISTAKES = {
         ("half_space", "half_spaces", r"did you mean 'half_space'"),
         ("normal =", "normals =", r"'obstacle.plane.shape.normals'"),
         (", normal = [0.0, -1.0]", "", r"'obstacle.plane.shape' needs 'normal'"),
-        ("y = -2.0 }", 'y = "down" }', r"'obstacle.plane.motion.y' must be of type"),
+        ("y = -2.0 }", 'y = "down" }', r"'obstacle.plane.motion' must be a table of numbers by name"),
     ],
     SURFACE: [
         ('group = "TOOL"\n', "", r"'obstacle.plane.shape' needs 'group'"),
