@@ -11,7 +11,6 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, errors_at, unquoted
 from fastcontact.cases.decks.content import Content, Coupling, MultiPoint, Pair
@@ -120,7 +119,7 @@ def _followers(deck_mesh: DeckMesh, coupling: Coupling) -> list[int]:
         if definition.of_nodes:
             points = deck_mesh.surface_nodes(definition, scope)
         else:
-            points = [p for face in deck_mesh.faces(coupling.group, coupling.location) for p in facet_points(*face)]
+            points = [p for face in deck_mesh.faces(coupling.group, coupling.location) for p in face.points]
     reference = deck_mesh.node(coupling.reference, coupling.location)
     followers = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
     if not followers:

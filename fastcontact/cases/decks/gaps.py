@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.cases.decks.assembled import Assembly, facet_points
+from fastcontact.cases.decks.assembled import Assembly
 from fastcontact.cases.decks.blocks import Block, Item, errors_at, key_of
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.meshing import DeckMesh
@@ -87,8 +87,8 @@ def add_gap_facets(deck_mesh: DeckMesh) -> list[Gaps]:
 def _add_facets(deck_mesh: DeckMesh, group: str, points: Indices, block: Block) -> None:
     """Make a group of the facets whose nodes are all in `points`. Raises CaseError if a point belongs to no such facet."""
     selected = set(points.tolist())
-    faces = deck_mesh.faces_within(selected)
-    if {p for face in faces for p in facet_points(*face)} != selected:
+    faces = [face for face in deck_mesh.faces_touching(selected) if face.corners <= selected]
+    if {p for face in faces for p in face.points} != selected:
         raise block.error(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
         )

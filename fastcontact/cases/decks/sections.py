@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.cases.decks.assembled import Assembly, facet_points
+from fastcontact.cases.decks.assembled import Assembly
 from fastcontact.cases.decks.blocks import Block, Item, errors_at, key_of
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.content import Content
@@ -108,8 +108,8 @@ def _orientation_sign(deck_mesh: DeckMesh, section: PretensionSection) -> float:
     if section.normal is None:
         return 1.0
     points, outward = deck_mesh.points, np.zeros(3)
-    for solid, facet in deck_mesh.faces(section.surface, section.location):
-        outward += points[list(facet_points(solid, facet))].mean(axis=0) - points[list(solid.points)].mean(axis=0)
+    for face in deck_mesh.faces(section.surface, section.location):
+        outward += points[list(face.points)].mean(axis=0) - points[list(face.solid.points)].mean(axis=0)
     return float(np.copysign(1.0, outward @ np.array(section.normal)))
 
 
