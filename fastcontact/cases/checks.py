@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.resultants import contact_moment
-from fastcontact.cases.keys import NUMBER, check_keys, keys_of
+from fastcontact.cases.keys import NUMBER, check_keys
 from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -148,7 +148,10 @@ class Check:
         return f"{self.quantity} against {against} within {self.tolerance:g}"
 
 
-CHECK = keys_of(Check)
+CHECK: dict[str, Any] = {
+    **dict.fromkeys(("name", "quantity", "theory", "of", "source"), str),
+    **dict.fromkeys(("tolerance", "value", "factor"), NUMBER),
+}
 
 
 def read_check(

@@ -6,51 +6,34 @@ import contextlib
 import inspect
 import re
 import reprlib
-import types
-import typing
-from collections import abc
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from fastcontact._tools.argument_types import types_of
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.errors import CaseError, FastcontactError, unknown
 
 NUMBER = (int, float)
-# TOML types of numbers, of functions of the position (tables of values by position), and of sequences.
-_TOML: dict[Any, tuple[type, ...]] = {
-    float: NUMBER,
-    abc.Callable: (dict,),
-    **dict.fromkeys((abc.Sequence, abc.Iterable), (list,)),
-}
-
-
-def toml_types(annotation: Any) -> tuple[type, ...]:
-    """Return the TOML types that the annotation of an argument admits. In a case file, a table represents a function."""
-    kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
-    if kind in (typing.Union, types.UnionType):
-        return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in toml_types(member)))
-    if kind in (bool, int, str):
-        return (kind,)
-    return _TOML.get(kind, ())
-
-
-def keys_of(function: Callable[..., Any]) -> dict[str, tuple[type, ...]]:
-    """Return the TOML types of the fields of a class or of the arguments of a function, by name."""
-    return {name: toml_types(annotation) for name, annotation in types_of(function).items()}
-
-
 # Message of `fastcontact._tools.argument_types` about an argument of a wrong type.
 _ARGUMENT = re.compile(r"the argument (?P<key>\w+) of [\w.]+ must be (?P<kinds>.*), not (?P<given>.*)")
+# Words for types in messages about arguments, and the corresponding words for values in TOML.
+_TOML_WORDS = {
+    "a sequence of": "a list of",
+    "an array of": "a list of",
+    "sequences of two": "pairs",
+    "a dictionary": "a table",
+    "True or False": "true or false",
+    **dict.fromkeys((" or a function", " or None"), ""),
+}
 # Keys of the tables of a case file, with the TOML types of their values.
-AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
-SOLVE: dict[str, Any] = {"linear_solver": str, "linear_tolerance": NUMBER, **keys_of(Criteria)}
+SOLVE: dict[str, Any] = {
+    "linear_solver": str,
+    "linear_tolerance": NUMBER,
+    **dict.fromkeys(Criteria.__dataclass_fields__),
+}
 # Keys of a rigid surface that consists of the facets of a group, in a file or in the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
-# Keys of the rotation of a rigid obstacle or a support.
-ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
 SENSITIVITY: dict[str, Any] = {"quantity": list, "by": list}
 FIELD: dict[str, Any] = {"file": str, "field": str, "over": str, "instant": NUMBER}
 # Settings of studies of the case, which `fastcontact.studies.settings` reads.
@@ -161,7 +144,9 @@ def _message_about_key(where: str, text: str) -> str:
     match = _ARGUMENT.fullmatch(text)
     if match is None:
         return ""
-    kinds = match["kinds"].replace("a sequence of", "a list of").removesuffix(" or None")
+    kinds = match["kinds"]
+    for python, toml in _TOML_WORDS.items():
+        kinds = kinds.replace(python, toml)
     return f"the value of '{where}.{match['key']}' must be {kinds}, not {match['given']}"
 
 

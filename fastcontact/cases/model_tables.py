@@ -9,9 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastcontact._tools.argument_types import types_of
 from fastcontact.cases import keys
-from fastcontact.cases.keys import NUMBER, call_with_keys, check_keys, errors_at, list_of_tables, toml_types
+from fastcontact.cases.keys import NUMBER, call_with_keys, check_keys, errors_at, list_of_tables
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -93,17 +92,6 @@ _LAW_DESCRIPTIONS: dict[type[Material], str] = {
 }
 
 
-def _material_keys() -> dict[str, tuple[type, ...]]:
-    """Return the TOML types of the keys of all material laws, in the order in which messages list them."""
-    known: dict[str, set[type]] = {}
-    for law in _LAW_DESCRIPTIONS:
-        parameters = inspect.signature(law).parameters
-        for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
-            if key in parameters:
-                known.setdefault(key, set()).update(toml_types(annotation))
-    return {key: tuple(sorted(kinds, key=[*NUMBER, list, dict, bool, str].index)) for key, kinds in known.items()}
-
-
 # Functions by kind of table, for the kinds whose keys are not the arguments of a method `add_KIND` of `Model`.
 _SPECIAL: dict[str, Callable[..., None]] = {
     "material": _add_material,
@@ -126,39 +114,34 @@ _ADD: dict[str, Callable[..., None]] = {
 }  # fmt: skip
 # Functions for tables that refer to contact pairs and are therefore added after the pairs.
 _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_fluid_pressure}
+FUNCTIONS = _ADD | _ADD_TO_CONTACT
 # Kinds of tables of which a case file contains lists.
-LISTS = (*_ADD, *_ADD_TO_CONTACT)
-
-
-def _keys(*functions: Callable[..., None], **extra: Any) -> tuple[dict[str, Any], list[str]]:
-    """Return the TOML types of the keys of a table and its required keys.
-
-    The keys are the arguments of the `functions`, and the keys of `extra`, which contains their types.
-    """
-    known: dict[str, Any] = {}
-    required = []
-    for add in functions:
-        annotations = types_of(inspect.unwrap(add))
-        for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # the first parameter is the model
-            kinds = toml_types(annotations[key])
-            if parameter.kind is parameter.VAR_KEYWORD:
-                known |= dict.fromkeys(COMPONENTS, kinds) if key == "tensor_components" else keys.AXES
-            else:
-                known[key] = kinds if key in (*VARYING, "axes") else tuple(kind for kind in kinds if kind is not dict)
-                required += [key] * (parameter.default is parameter.empty)
-    return {**known, **extra}, required
+LISTS = tuple(FUNCTIONS)
 
 
 @functools.cache
-def keys_of_list(kind: str) -> tuple[dict[str, Any], Sequence[str]]:
-    """Return the TOML types of the keys of the tables of a kind, one of `LISTS`, and their required keys."""
+def keys_of_list(kind: str) -> tuple[dict[str, Any], list[str]]:
+    """Return the keys of the tables of a kind, one of `LISTS`, with None for each, and the required keys.
+
+    The keys are the arguments of the functions that add the tables to a model, which check the types of the values.
+    """
     if kind == "material":  # its required keys depend on the law
-        further = {"groups": (list, str), "law": str, "D": list, "hardening": list}
-        return _material_keys() | further | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)), ()
-    if kind == "temperature":  # it needs either a value or a file
-        return _keys(Model.add_temperature, Model.add_temperature_file)[0], ()
-    extra: dict[str, Any] = {"coupling": {"place": list}, "support": {"rotation": dict}}
-    return _keys({**_ADD, **_ADD_TO_CONTACT}[kind], **extra.get(kind, {}))
+        constants = [key for law in _LAW_DESCRIPTIONS for key in inspect.signature(law).parameters]
+        return dict.fromkeys(["groups", "law", *constants]), []
+    is_temperature = kind == "temperature"  # it needs either a value or a file
+    functions: list[Callable[..., None]] = [FUNCTIONS[kind]]
+    if is_temperature:
+        functions = [Model.add_temperature, Model.add_temperature_file]
+    keys, required = ["place"] if kind == "coupling" else [], []
+    for function in functions:
+        _, *parameters = inspect.signature(function).parameters.values()  # the first one is the model
+        for parameter in parameters:
+            if parameter.kind is parameter.VAR_KEYWORD:
+                keys += COMPONENTS if parameter.name == "tensor_components" else "xyz"
+            else:
+                keys.append(parameter.name)
+                required += [parameter.name] * (parameter.default is parameter.empty and not is_temperature)
+    return dict.fromkeys(keys), required
 
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
@@ -258,11 +241,11 @@ def _resolve_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     file = entry.get("file")
     if file is None:
         return entry
-    if isinstance(file, str):
-        return {**entry, "file": folder / file}
-    if not all(isinstance(name, str) for name in file):
+    names = file if isinstance(file, list) else [file]
+    if not all(isinstance(name, str) for name in names):
         raise CaseError(f"'file' must be a path or a list of paths, not {reprlib.repr(file)}")
-    return {**entry, "file": [folder / name for name in file]}
+    paths = [folder / name for name in names]
+    return {**entry, "file": paths if isinstance(file, list) else paths[0]}
 
 
 def _interpolant(where: str, value: Any) -> Any:
@@ -304,9 +287,6 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     if shape == "mesh":  # then the arguments of the shape are keys of the obstacle
         shape = {"kind": "mesh", **{key: options.pop(key) for key in keys.SURFACE if key in options}}
     obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
-    for key in ("motion", "force"):
-        if key in options:
-            check_keys(f"{where}.{key}", options[key], keys.AXES)
     with errors_at(where):
         model.add_obstacle(name, obstacle=obstacle, **_arguments(where, options))
 
@@ -325,11 +305,9 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
     arguments: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in shape.items() if k != "kind"}
     if kind == "mesh":
         check_keys(where, arguments, keys.SURFACE)
-        if "group" not in arguments:
-            raise CaseError(f"'{where}' needs 'group', the facets of the rigid surface")
         file = arguments.pop("file", None)
-        return MeshedSurface(mesh if file is None else read_mesh(folder / file), **arguments)
-    obstacle: Obstacle = call_with_keys(where, SHAPES[kind], arguments)
+        arguments["mesh"] = mesh if file is None else read_mesh(folder / file)
+    obstacle: Obstacle = call_with_keys(where, MeshedSurface if kind == "mesh" else SHAPES[kind], arguments)
     return obstacle
 
 
@@ -341,12 +319,12 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     arguments = {key: value for key, value in entry.items() if key != "place"}  # `_add_references` has read the place
     if isinstance(entry.get("axes"), dict):
         arguments["axes"] = call_with_keys(f"{where}.axes", CylindricalAxes, entry["axes"])
-    if "rotation" in entry:
-        check_keys(f"{where}.rotation", entry["rotation"], keys.ROTATION)
+    if isinstance(entry.get("rotation"), dict):
         arguments["rotation"] = _arguments(f"{where}.rotation", entry["rotation"])
     if "ramp" in entry:
         arguments["ramp"] = ramp_points(entry["ramp"], f"{where}.ramp")
-    for term in entry.get("terms", []):
+    terms = entry.get("terms", [])
+    for term in terms if isinstance(terms, list) else [terms]:
         kinds: list[Any] = [(str, int), str, NUMBER]
         if not isinstance(term, list) or len(term) != 3 or not all(map(isinstance, term, kinds)):
             raise CaseError(

@@ -489,4 +489,6 @@ friction = 0.3
     assert told["obstacle_angle"] == -0.5
     assert "obstacle 'disc' has turned by -0.5 rad, with a torque of" in capsys.readouterr().out
     path.write_text(text.replace("angle = -0.5", "angel = -0.5"), encoding="utf-8")
-    refused(fc.CaseError, r"did you mean 'obstacle\.disc\.rotation\.angle'", read_case, path)
+    refused(
+        fc.ModelError, r"unknown key of the rotation of obstacle 'disc' 'angel': did you mean 'angle'", read_case, path
+    )

@@ -196,7 +196,11 @@ def case(tmp_path, text, kinematics="plane_stress"):
         ("[[initial_strain]]\nxx = 1.0\naxes = [[1, 0, 1], [0, 1, 0]]", "plane_strain", "which plane_strain does"),
         ("[[initial_strain]]\nxx = nan", "plane_strain", "xx of the initial strain of all solid cells is nan"),
         ("[[initial_strain]]\nrr = 1.0", "plane_strain", r"unknown key 'initial_strain\[0\].rr'"),
-        ("[[initial_strain]]\nxx = 'a'", "plane_strain", r"'initial_strain\[0\].xx' must be of type int or float"),
+        (
+            "[[initial_strain]]\nxx = 'a'",
+            "plane_strain",
+            r"'initial_strain\[0\].xx' must be a number or a list of numbers, not",
+        ),
     ],
 )
 def test_mistakes_are_told(tmp_path, text, kinematics, message):

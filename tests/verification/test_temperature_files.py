@@ -226,7 +226,7 @@ def test_fields_in_case_files(folder):
         ("file = 'heat.med'\nfield = 'TMP'", "unknown field 'TMP': did you mean 'TEMP'"),
         ("file = 'heat.vtu'\nfield = 'TMP'", "unknown field 'TMP': did you mean 'TEMP'"),
         ("file = 'nothing.med'\nfield = 'TEMP'", "nothing.med"),
-        ("file = 3\nfield = 'TEMP'", "'temperature\\[0\\].file' must be of type str or list"),
+        ("file = 3\nfield = 'TEMP'", "'file' must be a path or a list of paths, not 3"),
         ("file = [3]\nfield = 'TEMP'", "'file' must be a path or a list of paths"),
         ("file = []\nfield = 'TEMP'", "no file is given for the temperature"),
         ("file = 'vectors.med'\nfield = 'TEMP'", "has 2 components: a field with a single number per point is needed"),

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import LONGEST_QUOTED, Location, Row, key_of, look_up
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, Surface, SurfaceEntry
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.mesh import elements
+from fastcontact.mesh import elements, topology
+from fastcontact.mesh.mesh import Mesh
 
 # Largest number of set names that a message lists.
 MOST_NAMES = 12
@@ -50,8 +51,24 @@ class Element:
         assert self.section is not None
         return self.section
 
+    def face(self, facet: int) -> Face:
+        """Return the face of a solid that is the facet of its mesh element with this index."""
+        reference = elements.get(self.solid.element)
+        return Face(reference.facet_elements[facet], tuple(self.points[i] for i in reference.facets[facet]), self)
 
-Face = tuple[Element, int]
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """A facet of a solid: its element type and its points, by which faces are compared."""
+
+    type: str
+    points: tuple[int, ...]
+    solid: Element = field(compare=False)
+
+    @property
+    def corners(self) -> frozenset[int]:
+        """The points at the corners."""
+        return frozenset(self.points[: elements.get(self.type).n_corners])
 
 
 @dataclass
@@ -70,7 +87,7 @@ class Assembly:
         Elements by instance and element number.
     resolved : dict of (str, str, str) to list
         Members of the sets that have been resolved so far, by kind, instance and name.
-    surfaces : dict of str to list of (Element, int)
+    surfaces : dict of str to list of Face
         Faces of the surfaces that have been resolved so far.
     being_resolved : list of (str, str, str)
         Sets that are being resolved, for the detection of sets that contain themselves.
@@ -83,6 +100,38 @@ class Assembly:
     resolved: dict[tuple[str, str, str], list[Any]] = field(default_factory=dict)
     surfaces: dict[str, list[Face]] = field(default_factory=dict)
     being_resolved: list[tuple[str, str, str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Add the points and elements of all instances. Raises CaseError if an element uses an undefined node."""
+        n_points, counts = 0, dict[str, int]()
+        coordinates = []
+        for scope in self.scopes:
+            part = self.part(scope)
+            coordinates.append(_coordinates_in_assembly(part, self.content.instances.get(scope)))
+            index = {number: n_points + row for number, row in part.nodes.items()} if n_points else part.nodes
+            self.index[scope] = index
+            n_points += len(index)
+            elements = self.elements[scope] = {}
+            for number, cell in part.cells.items():
+                points = tuple(index.get(node, -1) for node in cell.nodes)
+                if -1 in points:
+                    raise cell.error(f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined")
+                kind = element_type(cell.type)
+                row = -1 if kind is None else counts.setdefault(kind.element, 0)
+                if kind is not None:
+                    counts[kind.element] += 1
+                elements[number] = Element(scope, number, cell, kind, points, row)
+        self.points = np.concatenate(coordinates) if len(coordinates) > 1 else coordinates[0]
+
+    @cached_property
+    def kinematics(self) -> str:
+        """Kinematics of the solids."""
+        return self.solids[0].solid.kinematics
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the mesh."""
+        return 3 if self.kinematics == "3d" else 2
 
     @cached_property
     def solids(self) -> list[Element]:
@@ -201,10 +250,7 @@ class Assembly:
         return nodes[0]
 
     def faces(self, name: str, location: Location) -> list[Face]:
-        """Return the faces of a surface, each as an element and the index of its facet.
-
-        Raises CaseError if it has no faces.
-        """
+        """Return the faces of a surface. Raises CaseError if it has no faces."""
         definition, scope = self.surface(name, location)
         if definition.of_nodes:
             complete, _, remaining = self.faces_of_nodes(definition, scope)
@@ -240,41 +286,21 @@ class Assembly:
             raise location.error(f"element {element.number} is not a solid, so it has no faces")
         return element.type
 
-    def facet(self, element: Element, label: int, location: Location) -> int:
-        """Return the index of the facet of an element with a face label, counted from 1.
-
-        Raises CaseError if there is none.
-        """
+    def face(self, element: Element, label: int, location: Location) -> Face:
+        """Return the face of an element with a label, counted from 1. Raises CaseError if there is none."""
         solid = self._type_of_solid(element, location)
         if not 1 <= label <= len(solid.faces):
             raise location.error(
                 f"element {element.number} of type {solid.name} has no face {label}, only 1 to {len(solid.faces)}"
             )
-        return solid.faces[label - 1]
+        return element.face(solid.faces[label - 1])
 
-    def _faces_of(self, element: Element, entry: SurfaceEntry) -> Iterator[Face]:
-        """Yield the face of an element that an entry of a surface selects, or its faces that no other solid shares."""
+    def _faces_of(self, element: Element, entry: SurfaceEntry) -> list[Face]:
+        """Return the face of an element that an entry of a surface selects, or its faces that no other solid shares."""
         if entry.label:
-            yield element, self.facet(element, int(entry.label[1:]), entry.location)
-            return
-        solid = self._type_of_solid(element, entry.location)
-        is_outer = self.outer_facets[solid.element][element.row]
-        yield from ((element, facet) for facet in solid.faces if is_outer[facet])
-
-    @cached_property
-    def outer_facets(self) -> dict[str, Mask]:
-        """Masks (n_elements, n_facets), by type of mesh element, of the facets that no other solid shares."""
-        corners, shapes = [], {}
-        for name, members in self.solids_by_type.items():
-            points, facets = np.array([element.points for element in members], np.int32), corners_of_facets(name)
-            shapes[name] = len(members), len(facets)
-            sorted_corners = np.full((*shapes[name], 4), -1, np.int32)
-            for k, facet in enumerate(facets):
-                sorted_corners[:, k, : len(facet)] = np.sort(points[:, facet], axis=1)
-            corners.append(sorted_corners.reshape(-1, 4))
-        _, inverse, count = np.unique(np.concatenate(corners), axis=0, return_inverse=True, return_counts=True)
-        masks = np.split(count[inverse.ravel()] == 1, np.cumsum([n * m for n, m in shapes.values()])[:-1])
-        return {name: mask.reshape(shapes[name]) for name, mask in zip(shapes, masks, strict=True)}
+            return [self.face(element, int(entry.label[1:]), entry.location)]
+        self._type_of_solid(element, entry.location)
+        return self.outer_faces.get(element, [])
 
     @cached_property
     def solids_by_type(self) -> dict[str, list[Element]]:
@@ -285,24 +311,33 @@ class Assembly:
         return elements
 
     @cached_property
-    def outer_faces(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
-        """The outer faces at each point, with their corner points."""
-        by_point: dict[int, list[tuple[Face, frozenset[int]]]] = {}
-        for element in self.solids:
-            name = element.solid.element
-            for facet in np.flatnonzero(self.outer_facets[name][element.row]).tolist():
-                corners = frozenset(element.points[i] for i in corners_of_facets(name)[facet])
-                for point in facet_points(element, facet):
-                    by_point.setdefault(point, []).append(((element, facet), corners))
+    def solid_mesh(self) -> Mesh:
+        """Mesh of the solids, without groups."""
+        cells = {name: [element.points for element in members] for name, members in self.solids_by_type.items()}
+        return Mesh(self.points[:, : self.dim], {name: np.array(block, np.int32) for name, block in cells.items()})
+
+    @cached_property
+    def outer_faces(self) -> dict[Element, list[Face]]:
+        """The faces of each solid that no other solid shares."""
+        solids = list(itertools.chain.from_iterable(self.solids_by_type.values()))
+        cells, faces = topology.cells_of_outer_facets(self.solid_mesh), {}  # type: Any, dict[Element, list[Face]]
+        for name, facets in topology.outer_facets(self.solid_mesh).items():
+            for cell, points in zip(cells[name].tolist(), facets.tolist(), strict=True):
+                faces.setdefault(solids[cell], []).append(Face(name, tuple(points), solids[cell]))
+        return faces
+
+    @cached_property
+    def outer_faces_at(self) -> dict[int, list[Face]]:
+        """The outer faces at each point."""
+        by_point: dict[int, list[Face]] = {}
+        for face in itertools.chain.from_iterable(self.outer_faces.values()):
+            for point in face.points:
+                by_point.setdefault(point, []).append(face)
         return by_point
 
-    def _faces_at(self, points: set[int]) -> Iterable[tuple[Face, frozenset[int]]]:
-        """Return the outer faces with a point in `points`, with their corner points."""
-        return dict.fromkeys(face for point in sorted(points) for face in self.outer_faces.get(point, ()))
-
-    def faces_within(self, points: set[int]) -> list[Face]:
-        """Return the outer faces whose corners are all in `points`."""
-        return [face for face, corners in self._faces_at(points) if corners <= points]
+    def faces_touching(self, points: set[int]) -> list[Face]:
+        """Return the outer faces with a point in `points`."""
+        return list(dict.fromkeys(face for point in sorted(points) for face in self.outer_faces_at.get(point, ())))
 
     def surface_nodes(self, definition: Surface, scope: str) -> list[int]:
         """Return the points of a node-based surface without repetition."""
@@ -326,9 +361,8 @@ class Assembly:
         nodes = set(self.surface_nodes(definition, scope))
         complete: list[tuple[Face, set[int]]] = []
         incomplete: list[tuple[Face, set[int]]] = []
-        for face, corners in self._faces_at(nodes):
-            shared = nodes.intersection(facet_points(*face))
-            (complete if corners <= nodes else incomplete).append((face, shared))
+        for face in self.faces_touching(nodes):
+            (complete if face.corners <= nodes else incomplete).append((face, nodes.intersection(face.points)))
         remaining = nodes.difference(*(shared for _, shared in complete))
         largest: dict[int, int] = {}
         for _, shared in incomplete:
@@ -340,42 +374,6 @@ class Assembly:
 def qualified(scope: str, name: str) -> str:
     """Return the name of a set, a surface or an element of an instance, such as ``Part-1.17``; see `Assembly.split_name`."""
     return f"{scope}.{name}" if scope else name
-
-
-def facet_points(element: Element, facet: int) -> tuple[int, ...]:
-    """Return the points of a facet of an element."""
-    return tuple(element.points[i] for i in elements.get(element.solid.element).facets[facet])
-
-
-@cache
-def corners_of_facets(name: str) -> list[list[int]]:
-    """Return the local nodes at the corners of each facet of a mesh element."""
-    element = elements.get(name)
-    facets = zip(element.facets, element.facet_elements, strict=True)
-    return [list(facet[: elements.get(kind).n_corners]) for facet, kind in facets]
-
-
-def assemble(assembly: Assembly) -> None:
-    """Add the points and elements of all instances to an assembly. Raises CaseError if an element uses an undefined node."""
-    content, n_points, counts = assembly.content, 0, {}  # type: Content, int, dict[str, int]
-    coordinates = []
-    for scope in assembly.scopes:
-        part = assembly.part(scope)
-        coordinates.append(_coordinates_in_assembly(part, content.instances.get(scope)))
-        index = {number: n_points + row for number, row in part.nodes.items()} if n_points else part.nodes
-        assembly.index[scope] = index
-        n_points += len(index)
-        elements = assembly.elements[scope] = {}
-        for number, cell in part.cells.items():
-            points = tuple(index.get(node, -1) for node in cell.nodes)
-            if -1 in points:
-                raise cell.error(f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined")
-            kind = element_type(cell.type)
-            row = -1 if kind is None else counts.setdefault(kind.element, 0)
-            if kind is not None:
-                counts[kind.element] += 1
-            elements[number] = Element(scope, number, cell, kind, points, row)
-    assembly.points = np.concatenate(coordinates) if len(coordinates) > 1 else coordinates[0]
 
 
 def _coordinates_in_assembly(part: Part, instance: Instance | None) -> Array:
@@ -432,7 +430,7 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
     on_all_solids = keyword == "DLOAD" and not row.text(0)
     elements = assembly.solids if on_all_solids else assembly.elements_of(row.text(0), row.location)
     if label[:1] == letter and label[1:].isdigit():
-        faces = [(element, assembly.facet(element, int(label[1:]), row.location)) for element in elements]
+        faces = [assembly.face(element, int(label[1:]), row.location) for element in elements]
         return [Target(keyword, row.location, letter, face, (), numbers) for face in faces]
     if label not in element_loads:
         labels = ", ".join([f"{letter}1", f"{letter}2", "...", *element_loads])

@@ -49,21 +49,16 @@ def distribution(content: Content, part: Part, block: Block) -> None:
     register("distribution", block.required("NAME"), content.distributions, block, block)
 
 
-def transform(content: Content, block: Block) -> None:
-    """Read *TRANSFORM: local axes of nodes."""
-    cylindrical = block.choice("TYPE", ("R", "C")) == "C"
-    row = block.only_row()
-    points = tuple(row.number(i) for i in range(6))
-    content.transforms.append(Axes(block.location, block.required("NSET"), cylindrical, points))
-
-
 def local_directions(assembly: Assembly) -> dict[int, Array]:
     """Return the local axes (3, 3) [-], in rows, of each point with *TRANSFORM."""
-    return {
-        point: local_axes(axes, assembly.points[point])
-        for axes in assembly.content.transforms
-        for point in assembly.nodes(axes.name, axes.location)
-    }
+    directions: dict[int, Array] = {}
+    for block in assembly.content.blocks["TRANSFORM"]:
+        row, name = block.only_row(), block.required("NSET")
+        points = tuple(row.number(i) for i in range(6))
+        axes = Axes(block.location, name, block.choice("TYPE", ("R", "C")) == "C", points)
+        nodes = assembly.nodes(name, block.location)
+        directions |= {point: local_axes(axes, assembly.points[point]) for point in nodes}
+    return directions
 
 
 def orientation_of(content: Content, name: str, location: Location) -> Axes:

@@ -18,7 +18,7 @@ from fastcontact.cases.decks.conditions import Component, Conditions
 from fastcontact.cases.decks.constraints import add_rotation_points, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
-from fastcontact.cases.decks.gaps import GAP_TOLERANCE, add_gap_facets, add_gaps, check_discrete
+from fastcontact.cases.decks.gaps import GAP_TOLERANCE, add_gap_facets, add_gaps, add_springs
 from fastcontact.cases.decks.histories import Period, ShapeGroups
 from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
@@ -78,9 +78,9 @@ class Building:
         conditions.record()
         loads = distributed_loads(self.assembly, conditions.loads) + distributed_loads(self.assembly, conditions.fluxes)
         loads += heat_loads(self.assembly, conditions, self.thickness)
-        if not only_heat:
-            add_gap_facets(self.assembly)
-        mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
+        gaps = [] if only_heat else add_gap_facets(self.assembly)
+        mesh = self.assembly.mesh()
+        mesh = mesh if only_heat else cut_sections(self.assembly, mesh, self.sections.values())
         strain, self.small_strain_cause = strain_of(content, [law for law, _ in materials])
         options: dict[str, Any] = {"strain": strain, "reference_temperature": conditions.reference}
         self.model = Model(mesh, self.assembly.kinematics, case_text, **options)
@@ -97,7 +97,7 @@ class Building:
         for add in loads:
             add(self.model)
         self._add_contact()
-        self.gap_ends = {} if only_heat else add_gaps(self.model, self.assembly, conditions)
+        self.gap_ends = add_gaps(self.model, self.assembly, gaps, conditions)
         self.ramp = self._ramp(conditions)
 
     def _add_mechanics(self, conditions: Conditions) -> None:
@@ -109,7 +109,7 @@ class Building:
         add_forces(self.model, self.assembly, conditions, self.thickness)
         add_temperatures(self.model, conditions.given_temperatures)
         add_initial_stresses(self.model, self.assembly)
-        self._add_springs()
+        add_springs(self.model, self.assembly, self.thickness)
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
         """Return the materials with their groups of solids, and the thickness [length].
@@ -230,13 +230,6 @@ class Building:
         point, axis, local = component
         direction = (conditions.directions[point] if local else np.eye(3))[[axis], : self.assembly.dim]
         return rows_along(np.array([point]), direction, self.model.n_dofs)
-
-    def _add_springs(self) -> None:
-        """Add the springs. Raises CaseError if an element of *SPRING is not a spring, or a spring has no stiffness."""
-        check_discrete(self.assembly, "SPRINGA", self.content.springs, "*SPRING")
-        for name, spring in self.content.springs.items():
-            for element in self.assembly.elements_of(name, spring.location):
-                self.model.add_spring(element.points[0], element.points[1], axial=spring.stiffness / self.thickness)
 
     def _add_contact(self) -> None:
         """Add the contact pairs and ties of the deck."""

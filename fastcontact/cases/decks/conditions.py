@@ -53,7 +53,7 @@ class Conditions:
 
     def __init__(self, assembly: DeckMesh) -> None:
         self.assembly, content = assembly, assembly.content
-        initial = initial_temperatures(assembly, content.initial_temperatures)
+        initial = initial_temperatures(assembly, content.blocks["INITIAL TEMPERATURE"])
         self.reference = reference_temperature(assembly, initial) if content.heat else 0.0
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
@@ -81,7 +81,7 @@ class Conditions:
 
     def record(self) -> None:
         """Record the supports and loads of all steps."""
-        for block in self.assembly.content.supports:
+        for block in self.assembly.content.blocks["BOUNDARY"]:
             self._record_supports(block, precedes_steps=True)
         for history in (self.supports, self.fixed_temperatures):
             history.initial, history.step_values = history.step_values, {}

@@ -11,10 +11,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, errors_at, unquoted
-from fastcontact.cases.decks.content import Content, Coupling, Equation, MultiPoint, Pair, SectorEnds
+from fastcontact.cases.decks.content import Content, Coupling, MultiPoint, Pair
 from fastcontact.cases.decks.meshing import DeckMesh, ascending, group_of_surface
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -26,6 +25,8 @@ MIN_NODES = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
 # Relative tolerance of the tests for coincident or collinear nodes, and for nodes on the axis of MEANROT, whose squared
 # distances are compared.
 DEGENERATE = 1e-9
+# Largest number of terms of an equation. All displacements in an equation are coupled to each other.
+MOST_TERMS = 100_000
 
 
 def add_rotation_points(deck_mesh: DeckMesh) -> None:
@@ -49,7 +50,7 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
     """Return one constraint for all equations and *MPC, and one for each rigid body and each coupling."""
     content = deck_mesh.content
     axes = local_directions(deck_mesh)
-    rows = [_equation(deck_mesh, equation, axes) for equation in content.equations]
+    rows = [row for block in content.blocks["EQUATION"] for row in _equations(deck_mesh, block, axes)]
     rows += [row for constraint in content.multi_points for row in multi_point_rows(deck_mesh, constraint)]
     constraints = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for coupling in content.couplings:
@@ -58,18 +59,34 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
     return constraints
 
 
-def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]) -> list[Term]:
-    """Return the terms of an equation along the global axes; its components are along the local `axes` of points."""
-    terms: list[Term] = []
-    for name, component, coefficient in equation.terms:
-        point = deck_mesh.node(name, equation.location)
-        if not 1 <= component <= deck_mesh.dim:
-            raise equation.error(f"component {component} of '{name}' is not within 1 to {deck_mesh.dim}")
-        along = axes.get(point, np.eye(3))[component - 1]
-        terms += [(point, axis, coefficient * along[axis]) for axis in np.flatnonzero(along[: deck_mesh.dim]).tolist()]
-    if not any(coefficient for _, _, coefficient in terms):
-        raise equation.error("all coefficients of the equation are zero")
-    return terms
+def _equations(deck_mesh: DeckMesh, block: Block, axes: Mapping[int, Array]) -> Iterator[list[Term]]:
+    """Yield the terms of each equation of *EQUATION, whose lines state their number and then node, component and coefficient.
+
+    The components are along the local `axes` of points, those of the terms along the global axes.
+    """
+    rows = block.iter_rows()
+    for first in rows:
+        count, n_terms, terms = first.integer(0), 0, []  # type: int, int, list[Term]
+        if not 1 <= count <= MOST_TERMS:
+            raise first.error(f"an equation cannot have {count} terms")
+        while n_terms < count and (row := next(rows, None)) is not None:
+            for start in (start for start in range(0, len(row.entries), 3) if row.text(start)):
+                terms += _equation_terms(deck_mesh, row, start, axes)
+                n_terms += 1
+        if n_terms != count:
+            raise first.error(f"the equation has {n_terms} terms, {count} are announced")
+        if not any(coefficient for _, _, coefficient in terms):
+            raise first.error("all coefficients of the equation are zero")
+        yield terms
+
+
+def _equation_terms(deck_mesh: DeckMesh, row: Row, start: int, axes: Mapping[int, Array]) -> Iterator[Term]:
+    """Yield the terms along the global axes of the term in the entries `start` to `start` + 2 of a line."""
+    point, component = deck_mesh.node(row.text(start), row.location), row.integer(start + 1)
+    if not 1 <= component <= deck_mesh.dim:
+        raise row.error(f"component {component} of '{row.text(start)}' is not within 1 to {deck_mesh.dim}")
+    along = row.number(start + 2) * axes.get(point, np.eye(3))[component - 1]
+    yield from ((point, axis, along[axis]) for axis in np.flatnonzero(along[: deck_mesh.dim]).tolist())
 
 
 def _pin_rows(deck_mesh: DeckMesh, pin: MultiPoint) -> list[list[Term]]:
@@ -102,7 +119,7 @@ def _followers(deck_mesh: DeckMesh, coupling: Coupling) -> list[int]:
         if definition.of_nodes:
             points = deck_mesh.surface_nodes(definition, scope)
         else:
-            points = [p for face in deck_mesh.faces(coupling.group, coupling.location) for p in facet_points(*face)]
+            points = [p for face in deck_mesh.faces(coupling.group, coupling.location) for p in face.points]
     reference = deck_mesh.node(coupling.reference, coupling.location)
     followers = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
     if not followers:
@@ -205,10 +222,6 @@ def _terms(points: list[int], coefficients: Array) -> list[Term]:
     ]
 
 
-# Largest number of terms of an equation. All displacements in an equation are coupled to each other.
-MOST_TERMS = 100_000
-
-
 def contact_pair(content: Content, block: Block) -> None:
     """Read *CONTACT PAIR; the first surface of a line is the secondary side, the second one the primary side."""
     kinds = ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR")
@@ -218,10 +231,10 @@ def contact_pair(content: Content, block: Block) -> None:
         content.note(block, "SMALL SLIDING: no effect, contact is detected in the deformed configuration")
     adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
     interaction = block.required("INTERACTION")
-    content.pairs += [Pair(*sides, interaction, adjust=adjust) for sides in _sides(block, "a contact pair")]
+    content.pairs += [Pair(*sides, interaction, adjust=adjust) for sides in sides_of(block, "a contact pair")]
 
 
-def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
+def sides_of(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
     """Yield the location of each data line with the names of its secondary and its primary surface."""
     for row in block.iter_rows():
         if len([entry for entry in row.entries if entry]) != 2:
@@ -245,8 +258,7 @@ def tie(content: Content, block: Block) -> None:
     """Read *TIE: tied surfaces, or the end surfaces of a cyclic sector."""
     if "CYCLIC SYMMETRY" in block.parameters:
         block.only_row()
-        ends = [(first, second) for _, first, second in _sides(block, "cyclic symmetry")]
-        content.sector_ends.append(SectorEnds(block.location, block.get("NAME"), ends[0]))
+        content.sector_ends += [(block, first, second) for _, first, second in sides_of(block, "cyclic symmetry")]
         return
     adjust = block.choice("ADJUST", ("YES", "NO"))
     if tolerance := block.get("POSITION TOLERANCE"):
@@ -257,26 +269,7 @@ def tie(content: Content, block: Block) -> None:
         content.note(block, f"POSITION TOLERANCE={value:g}: {text}")
     if adjust == "YES" and "ADJUST" in block.parameters:
         content.note(block, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
-    content.pairs += [Pair(*sides, tied=True) for sides in _sides(block, "a tie")]
-
-
-def equation(content: Content, block: Block) -> None:
-    """Read *EQUATION: the number of terms, then the node, component and coefficient of each term."""
-    rows = block.iter_rows()
-    for first in rows:
-        count = first.integer(0)
-        terms: list[tuple[str, int, float]] = []
-        if not 1 <= count <= MOST_TERMS:
-            raise first.error(f"an equation cannot have {count} terms")
-        while len(terms) < count:
-            row = next(rows, None)
-            if row is None:
-                break
-            starts = (start for start in range(0, len(row.entries), 3) if row.text(start))
-            terms += [(row.text(start), row.integer(start + 1), row.number(start + 2)) for start in starts]
-        if len(terms) != count:
-            raise first.error(f"the equation has {len(terms)} terms, {count} are announced")
-        content.equations.append(Equation(first.location, tuple(terms)))
+    content.pairs += [Pair(*sides, tied=True) for sides in sides_of(block, "a tie")]
 
 
 def multi_point(content: Content, block: Block) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -185,21 +186,6 @@ class Pair(Located):
 
 
 @dataclass(frozen=True)
-class SectorEnds(Item):
-    """The name of a tie with cyclic symmetry and its surfaces, which are the ends of the sector."""
-
-    name: str
-    surfaces: tuple[str, str]
-
-
-@dataclass(frozen=True)
-class Equation(Item):
-    """A linear multi-point constraint: node, component and coefficient of each term."""
-
-    terms: tuple[tuple[str, int, float], ...]
-
-
-@dataclass(frozen=True)
 class MultiPoint(Item):
     """A multi-point constraint of a kind of *MPC except BEAM, with its nodes or node sets."""
 
@@ -223,30 +209,6 @@ class Coupling(Item):
     distributing: bool = False
     rotation: str = ""
     orientation: str = ""  # axes of the components
-
-
-@dataclass(frozen=True)
-class PretensionSection(Item):
-    """A pretension section of a bolt: its surface, the node whose displacement is the shortening, and its normal [-]."""
-
-    surface: str
-    node: str
-    normal: tuple[float, ...] | None
-
-
-@dataclass(frozen=True)
-class Gap(Item):
-    """Properties of gap elements: initial clearance [length], and direction from the first to the second node [-]."""
-
-    clearance: float
-    direction: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Spring(Item):
-    """Properties of springs: axial stiffness [force / length]."""
-
-    stiffness: float
 
 
 @dataclass(frozen=True)
@@ -295,7 +257,10 @@ class Step(Located):
 
 @dataclass
 class Content:
-    """The content of a deck."""
+    """The content of a deck.
+
+    `blocks` contains the blocks that are interpreted when the model is built, by keyword.
+    """
 
     title: str = ""
     root: Part = field(default_factory=Part)
@@ -304,21 +269,13 @@ class Content:
     materials: dict[str, Material] = field(default_factory=dict)
     interactions: dict[str, Interaction] = field(default_factory=dict)
     pairs: list[Pair] = field(default_factory=list)
-    sector_ends: list[SectorEnds] = field(default_factory=list)
-    sectors: list[Block] = field(default_factory=list)
-    equations: list[Equation] = field(default_factory=list)
+    sector_ends: list[tuple[Block, str, str]] = field(default_factory=list)  # *TIE and its surfaces
     multi_points: list[MultiPoint] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)
-    transforms: list[Axes] = field(default_factory=list)
-    pretension_sections: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
     distributions: dict[str, Block] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
-    gaps: dict[str, Gap] = field(default_factory=dict)
-    springs: dict[str, Spring] = field(default_factory=dict)
-    supports: list[Block] = field(default_factory=list)  # before all steps
-    initial_temperatures: list[Block] = field(default_factory=list)
-    initial_stresses: list[Block] = field(default_factory=list)
+    blocks: defaultdict[str, list[Block]] = field(default_factory=lambda: defaultdict(list))
     steps: list[Step] = field(default_factory=list)
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)

@@ -20,7 +20,7 @@ def initial_conditions(content: Content, block: Block) -> None:
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
         raise block.error(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
-    (content.initial_temperatures if kind == "TEMPERATURE" else content.initial_stresses).append(block)
+    content.blocks[f"INITIAL {kind}"].append(block)
 
 
 def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
@@ -48,11 +48,11 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
     orientation.
     """
     content, names = deck_mesh.content, STRESS_ORDER[deck_mesh.dim]
-    if not content.initial_stresses:
+    if not content.blocks["INITIAL STRESS"]:
         return
     starts = starts_of(model.mesh.solids)
     values = np.zeros((sum(map(len, model.mesh.solids.values())), len(names)))
-    for block in content.initial_stresses:
+    for block in content.blocks["INITIAL STRESS"]:
         for row in block.iter_rows():
             if len(row.entries) != 1 + len(names):
                 raise row.error(
@@ -106,7 +106,7 @@ def reference_temperature(assembly: Assembly, initial: Mapping[int, float]) -> f
     values = {initial.get(point, 0.0) for point in assembly.solid_points}
     if len(values) == 1:
         return values.pop()
-    location = content.initial_temperatures[0].location
+    location = content.blocks["INITIAL TEMPERATURE"][0].location
     if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
         raise location.error(
             f"initial temperatures from {min(values):g} to {max(values):g} are not supported with thermal expansion in "

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.cases.decks.assembled import Assembly, facet_points
-from fastcontact.cases.decks.blocks import Block, errors_at, key_of
+from fastcontact.cases.decks.assembled import Assembly
+from fastcontact.cases.decks.blocks import Block, Item, errors_at, key_of
 from fastcontact.cases.decks.conditions import Conditions
-from fastcontact.cases.decks.content import Content, Gap, Spring
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.model.model import Model
@@ -21,69 +21,83 @@ from fastcontact.model.ramp import Table
 GAP_TOLERANCE = 1e-6
 
 
-def gap(content: Content, block: Block) -> None:
-    """Read *GAP: the clearance [length] and the direction [-] of gap elements."""
-    row = block.only_row()
-    direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
-    if not any(direction):
-        raise row.error("the direction of the gap elements is missing")
-    content.gaps[key_of(block.required("ELSET"))] = Gap(block.location, row.number(0), direction)
+@dataclass(frozen=True, eq=False)
+class Gaps(Item):
+    """Gap elements of a set: points (n, 2) of their nodes, clearance [length], direction (3,) from first to second [-]."""
+
+    name: str
+    ends: Indices
+    clearance: float
+    direction: Array
 
 
-def spring(content: Content, block: Block) -> None:
-    """Read *SPRING: the axial stiffness [force / length] of springs."""
-    rows = block.rows
-    if len(rows) != 1:
-        raise block.error("linear springs along their axis need an empty line, followed by a line with the stiffness")
-    if rows[0].text(1):
-        raise rows[0].error("only linear springs are supported: one stiffness")
-    content.springs[key_of(block.required("ELSET"))] = Spring(block.location, rows[0].positive(0, "stiffness"))
+def blocks_by_set(assembly: Assembly, keyword: str, kind: str) -> dict[str, Block]:
+    """Return the last block of a keyword for each element set.
 
-
-def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Gap | Spring], keyword: str) -> None:
-    """Raise CaseError if `keyword` gives properties to elements not of type `kind`, or not to all elements of this type."""
+    Raises CaseError if the blocks give properties to elements not of type `kind`, or not to all elements of this type.
+    """
+    blocks = {key_of(block.required("ELSET")): block for block in assembly.content.blocks[keyword]}
     with_properties = set()
-    for name, entry in properties.items():
-        for element in assembly.elements_of(name, entry.location):
+    for name, block in blocks.items():
+        for element in assembly.elements_of(name, block.location):
             if element.cell.type != kind:
-                raise entry.error(f"element {element.number} is not of type {kind}")
+                raise block.error(f"element {element.number} is not of type {kind}")
             with_properties.add(element)
     for element in assembly.discrete:
         if element.cell.type == kind and element not in with_properties:
-            raise element.cell.error(f"element {element.number} of type {kind} has no {keyword}")
+            raise element.cell.error(f"element {element.number} of type {kind} has no *{keyword}")
+    return blocks
 
 
-def add_gap_facets(deck_mesh: DeckMesh) -> None:
-    """Create groups of the facets with the first nodes of gap elements, and with the second nodes if these belong to solids.
+def add_springs(model: Model, assembly: Assembly, thickness: float) -> None:
+    """Add the springs; their stiffness is divided by the thickness [length]."""
+    for name, block in blocks_by_set(assembly, "SPRING", "SPRINGA").items():
+        rows = block.rows
+        if len(rows) != 1:
+            raise block.error(
+                "linear springs along their axis need an empty line, followed by a line with the stiffness"
+            )
+        if rows[0].text(1):
+            raise rows[0].error("only linear springs are supported: one stiffness")
+        stiffness = rows[0].positive(0, "stiffness") / thickness
+        for element in assembly.elements_of(name, block.location):
+            model.add_spring(element.points[0], element.points[1], axial=stiffness)
+
+
+def add_gap_facets(deck_mesh: DeckMesh) -> list[Gaps]:
+    """Return the gap elements by set, and create groups of the facets at their first nodes and, in solids, second nodes.
 
     Raises CaseError if the nodes do not fill whole facets.
     """
-    check_discrete(deck_mesh, "GAPUNI", deck_mesh.content.gaps, "*GAP")
-    for key, gap in deck_mesh.content.gaps.items():
-        name, ends = _name_and_ends(deck_mesh, key, gap)
-        _add_facets(deck_mesh, f"{name} facets", ends[:, 0], gap)
+    gaps = []
+    for key, block in blocks_by_set(deck_mesh, "GAP", "GAPUNI").items():
+        row = block.only_row()
+        direction = np.array([row.number(i, 0.0) for i in (1, 2, 3)])
+        if not direction.any():
+            raise row.error("the direction of the gap elements is missing")
+        ends = np.array([element.points for element in deck_mesh.elements_of(key, block.location)], np.intp)
+        name = deck_mesh.content.root.set_names.get(key, key)
+        gaps.append(Gaps(block.location, name, ends, row.number(0), direction / np.linalg.norm(direction)))
+        _add_facets(deck_mesh, f"{name} facets", ends[:, 0], block)
         if deck_mesh.solid_points.issuperset(ends[:, 1].tolist()):
-            _add_facets(deck_mesh, f"{name} opposite facets", ends[:, 1], gap)
+            _add_facets(deck_mesh, f"{name} opposite facets", ends[:, 1], block)
+    return gaps
 
 
-def _name_and_ends(deck_mesh: DeckMesh, key: str, gap: Gap) -> tuple[str, Indices]:
-    """Return the name of a set of gap elements and the points (n, 2) of their first and second nodes."""
-    ends = [element.points for element in deck_mesh.elements_of(key, gap.location)]
-    return deck_mesh.content.root.set_names.get(key, key), np.array(ends, np.intp)
-
-
-def _add_facets(deck_mesh: DeckMesh, group: str, points: Indices, gap: Gap) -> None:
+def _add_facets(deck_mesh: DeckMesh, group: str, points: Indices, block: Block) -> None:
     """Make a group of the facets whose nodes are all in `points`. Raises CaseError if a point belongs to no such facet."""
     selected = set(points.tolist())
-    faces = deck_mesh.faces_within(selected)
-    if {p for face in faces for p in facet_points(*face)} != selected:
-        raise gap.error(
+    faces = [face for face in deck_mesh.faces_touching(selected) if face.corners <= selected]
+    if {p for face in faces for p in face.points} != selected:
+        raise block.error(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
         )
     deck_mesh.add_facets(group, faces)
 
 
-def add_gaps(model: Model, deck_mesh: DeckMesh, conditions: Conditions) -> dict[str, dict[int, int]]:
+def add_gaps(
+    model: Model, deck_mesh: DeckMesh, gaps: Iterable[Gaps], conditions: Conditions
+) -> dict[str, dict[int, int]]:
     """Add the contact of gap elements to a model.
 
     Returns, by the name of each contact with a rigid plane, the second node of each first node. Raises CaseError if the nodes
@@ -91,31 +105,27 @@ def add_gaps(model: Model, deck_mesh: DeckMesh, conditions: Conditions) -> dict[
     """
     points, gap_ends = model.mesh.points, {}
     tolerance = GAP_TOLERANCE * float(np.ptp(points, axis=0).max())
-    for key, gap in deck_mesh.content.gaps.items():
-        name, ends = _name_and_ends(deck_mesh, key, gap)
-        direction = np.array(gap.direction)[: deck_mesh.dim] / np.linalg.norm(gap.direction)
-        if np.ptp(points[ends[:, 0]] @ direction) > tolerance:
+    for gap in gaps:
+        name, (first, second), direction = gap.name, points[gap.ends.T], gap.direction[: deck_mesh.dim]
+        if np.ptp(first @ direction) > tolerance:
             raise gap.error("gap elements are supported if their nodes lie in a plane normal to their direction")
+        options: dict[str, Any] = {"secondary": f"{name} facets", "formulation": "node_to_segment"}
         if (opposite := f"{name} opposite facets") in deck_mesh.groups:
-            distance = _distance(points[ends[:, 1]] - points[ends[:, 0]], direction, tolerance, gap)
+            distance = _distance(second - first, direction, tolerance, gap)
             with errors_at(gap):
-                model.add_contact(
-                    name, secondary=f"{name} facets", primary=opposite, formulation="node_to_segment",
-                    clearance=gap.clearance - distance,
-                )  # fmt: skip
+                model.add_contact(name, primary=opposite, clearance=gap.clearance - distance, **options)
             continue
-        level = float((points[ends[:, 0]] @ direction).mean()) + gap.clearance
+        level = float((first @ direction).mean()) + gap.clearance
         plane = HalfSpace(tuple(level * direction), tuple(-direction))
-        history = _motion(gap, ends, direction, conditions)
-        motion: dict[str, Any] = {}
+        history = _motion(gap, direction, conditions)
         if any(value for _, value in history):
-            motion = {"motion": dict(zip("xyz", direction.tolist(), strict=False)), "ramp": history}
-        model.add_obstacle(name, secondary=f"{name} facets", obstacle=plane, formulation="node_to_segment", **motion)
-        gap_ends[name] = dict(ends.tolist())
+            options |= {"motion": dict(zip("xyz", direction.tolist(), strict=False)), "ramp": history}
+        model.add_obstacle(name, obstacle=plane, **options)
+        gap_ends[name] = dict(gap.ends.tolist())
     return gap_ends
 
 
-def _distance(vectors: Array, direction: Array, tolerance: float, gap: Gap) -> float:
+def _distance(vectors: Array, direction: Array, tolerance: float, gap: Gaps) -> float:
     """Return the common length [length] of the `vectors` (n, dim) from first to second nodes.
 
     Raises CaseError unless they are equal and parallel to the direction.
@@ -127,7 +137,7 @@ def _distance(vectors: Array, direction: Array, tolerance: float, gap: Gap) -> f
     return float(distances.mean())
 
 
-def _motion(gap: Gap, ends: Indices, direction: Array, conditions: Conditions) -> Table:
+def _motion(gap: Gaps, direction: Array, conditions: Conditions) -> Table:
     """Return the motion [length] of the second nodes along the direction.
 
     Raises CaseError unless it is prescribed and uniform.
@@ -135,7 +145,7 @@ def _motion(gap: Gap, ends: Indices, direction: Array, conditions: Conditions) -
     supports = conditions.supports
     by_axis: list[tuple[float, Array]] = []
     for axis in np.flatnonzero(direction).tolist():
-        components = [(end, axis, False) for end in ends[:, 1].tolist()]
+        components = [(end, axis, False) for end in gap.ends[:, 1].tolist()]
         prescribed = [c for c in components if c in supports.tracks and supports.tracks[c].periods[-1].permanent]
         tables = {supports.table(component) for component in prescribed}
         if len(tables) != 1 or len(prescribed) < len(components):

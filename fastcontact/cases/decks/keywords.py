@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from fastcontact.cases.decks import axes, constraints, fields, gaps, geometry, interactions, materials, sections, steps
+from fastcontact.cases.decks import axes, constraints, fields, geometry, interactions, materials, steps
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 
@@ -53,6 +53,11 @@ def heading(content: Content, block: Block) -> None:
 def ignore_with_note(text: str) -> Callable[..., None]:
     """Return the reading function of a keyword that has no effect apart from the note `text`."""
     return lambda content, *owner_and_block: content.note(owner_and_block[-1], text)
+
+
+def store(content: Content, *owner_and_block: Any) -> None:
+    """Store a block, which is interpreted when the model is built."""
+    content.blocks[owner_and_block[-1].keyword].append(owner_and_block[-1])
 
 
 def end(content: Content, block: Block) -> None:
@@ -118,17 +123,17 @@ TRANSLATED = {
     "AMPLITUDE": Keyword("model", steps.amplitude, "NAME; TIME; DEFINITION; VALUE"),
     "CLEARANCE": Keyword("model", constraints.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
     "CONTACT PAIR": Keyword("model", constraints.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
-    "CYCLIC SYMMETRY MODEL": Keyword("model", sections.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
-    "EQUATION": Keyword("model", constraints.equation),
-    "GAP": Keyword("model", gaps.gap, "ELSET"),
+    "CYCLIC SYMMETRY MODEL": Keyword("model", store, "N; TIE", "NGRAPH; CHECK; ELSET"),
+    "EQUATION": Keyword("model", store),
+    "GAP": Keyword("model", store, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", fields.initial_conditions, "TYPE"),
     "MPC": Keyword("model", constraints.multi_point),
     "PHYSICAL CONSTANTS": Keyword("model", ignore_with_note("no effect: there is no radiation"), ANYTHING),
-    "PRE-TENSION SECTION": Keyword("model", sections.pretension_section, "SURFACE; NODE"),
+    "PRE-TENSION SECTION": Keyword("model", store, "SURFACE; NODE"),
     "RIGID BODY": Keyword("model", constraints.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
-    "SPRING": Keyword("model", gaps.spring, "ELSET"),
+    "SPRING": Keyword("model", store, "ELSET"),
     "TIE": Keyword("model", constraints.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
-    "TRANSFORM": Keyword("model", axes.transform, "NSET; TYPE"),
+    "TRANSFORM": Keyword("model", store, "NSET; TYPE"),
     # Supports and loads in steps.
     "BOUNDARY": Keyword("step", steps.condition, "OP; AMPLITUDE; FIXED; TYPE"),
     **dict.fromkeys(

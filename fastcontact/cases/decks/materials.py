@@ -244,9 +244,9 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
     reasons = {
         "kinematic hardening": any(law.kinematic for law in plastic_laws),
         "a nearly incompressible elastic material": any(law.averaged and law not in plastic_laws for law in laws),
-        "initial stresses": bool(content.initial_stresses),
+        "initial stresses": bool(content.blocks["INITIAL STRESS"]),
         "couplings, rigid bodies and multi-point constraints": bool(content.couplings or content.multi_points),
-        "pretension sections": bool(content.pretension_sections),
+        "pretension sections": bool(content.blocks["PRE-TENSION SECTION"]),
         "incompatible modes": any(law.incompatible_modes for law in laws),
     }
     reason = next((name for name, applies in reasons.items() if applies), "")

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
 from fastcontact.arrays import Indices
-from fastcontact.cases.decks.assembled import Assembly, Element, Face, assemble, facet_points, qualified
+from fastcontact.cases.decks.assembled import Assembly, Element, Face, qualified
 from fastcontact.cases.decks.blocks import Location, key_of
 from fastcontact.cases.decks.content import Content, Surface
-from fastcontact.mesh import elements, topology
+from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh, starts_of
 
 # Largest difference in z between the points of a plane model, relative to its size.
@@ -47,37 +46,28 @@ class DeckMesh(Assembly):
     point_groups: dict[str, Indices] = field(default_factory=dict)
     excluded: dict[str, list[int]] = field(default_factory=dict)
 
-    @cached_property
-    def kinematics(self) -> str:
-        """Kinematics of the solids."""
-        return self.solids[0].solid.kinematics
-
-    @property
-    def dim(self) -> int:
-        """Dimension of the mesh."""
-        return 3 if self.kinematics == "3d" else 2
-
     def add_facets(self, group: str, faces: Iterable[Face]) -> str:
-        """Make a group of facets, each given as an element and the index of its facet, and return its name."""
+        """Make a group of facets and return its name."""
         self.groups[group] = self.facet_rows(faces)
         return group
 
     def facet_rows(self, faces: Iterable[Face]) -> dict[str, list[int]]:
         """Return the rows of facets by facet type; facets that do not exist yet are created."""
         rows: dict[str, list[int]] = {}
-        for element, facet in faces:
-            points = facet_points(element, facet)
-            name = elements.get(element.solid.element).facet_elements[facet]
-            facets = self.facets.setdefault(name, [])
-            row = self.row_of_facet.setdefault(tuple(sorted(points)), len(facets))
+        for face in faces:
+            facets = self.facets.setdefault(face.type, [])
+            row = self.row_of_facet.setdefault(tuple(sorted(face.points)), len(facets))
             if row == len(facets):
-                facets.append(points)
-            rows.setdefault(name, []).append(row)
+                facets.append(face.points)
+            rows.setdefault(face.type, []).append(row)
         return rows
 
     def add_solids(self, group: str, solids: Iterable[Element]) -> str:
-        """Make a group of solids and return its name."""
-        self.groups[group] = rows_by_type(solids)
+        """Make a group of the solids among some elements, and return its name."""
+        rows = self.groups[group] = {}
+        for element in solids:
+            if element.type is not None:
+                rows.setdefault(element.type.element, []).append(element.row)
         return group
 
     def add_points(self, group: str, points: Iterable[int]) -> str:
@@ -98,8 +88,8 @@ class DeckMesh(Assembly):
 
     def mesh(self) -> Mesh:
         """Return the mesh, with inverted solids reoriented."""
-        solids = {name: [element.points for element in members] for name, members in self.solids_by_type.items()}
-        cells = {name: np.array(block, np.int32) for name, block in {**solids, **self.facets}.items()}
+        facets = {name: np.array(block, np.int32) for name, block in self.facets.items()}
+        cells = {**self.solid_mesh.cells, **facets}
         starts = starts_of(cells)
         groups = {
             group: np.concatenate([[], *(starts[name] + np.array(rows) for name, rows in members.items())]).astype(int)
@@ -117,15 +107,6 @@ def ascending(points: Iterable[int]) -> Indices:
     return np.unique(points if isinstance(points, np.ndarray) else np.fromiter(points, np.intp))
 
 
-def rows_by_type(members: Iterable[Element]) -> dict[str, list[int]]:
-    """Return the rows of the solids among some elements, by cell type."""
-    rows: dict[str, list[int]] = {}
-    for element in members:
-        if element.type is not None:
-            rows.setdefault(element.type.element, []).append(element.row)
-    return rows
-
-
 def deck_mesh_of(content: Content) -> DeckMesh:
     """Return the assembly of a deck with groups for its sets and surfaces.
 
@@ -133,7 +114,6 @@ def deck_mesh_of(content: Content) -> DeckMesh:
     other than *HEAT TRANSFER, or if a plane model is not flat.
     """
     deck_mesh = DeckMesh(content)
-    assemble(deck_mesh)
     if not deck_mesh.solids:
         raise content.steps[0].error("the deck has no solid elements")
     first = deck_mesh.solids[0].solid
@@ -180,7 +160,7 @@ def _add_node_based_surface(deck_mesh: DeckMesh, group: str, definition: Surface
         return
     deck_mesh.add_facets(group, [*complete, *further])
     if remaining:
-        points = {point for face in (*complete, *further) for point in facet_points(*face)}
+        points = {point for face in (*complete, *further) for point in face.points}
         deck_mesh.excluded[group] = sorted(points.difference(deck_mesh.surface_nodes(definition, scope)))
 
 
@@ -188,7 +168,7 @@ def check_nodes(deck_mesh: DeckMesh, name: str, location: Location) -> None:
     """Raise CaseError if a node of a node-based surface is on no outer face of a solid."""
     definition, scope = deck_mesh.surface(name, location)
     for point in deck_mesh.surface_nodes(definition, scope) if definition.of_nodes else ():
-        if point not in deck_mesh.outer_faces:
+        if point not in deck_mesh.outer_faces_at:
             raise definition.error(
                 f"node {deck_mesh.label_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.cases.decks.assembled import Assembly, facet_points
-from fastcontact.cases.decks.blocks import Block, errors_at, key_of
+from fastcontact.cases.decks.assembled import Assembly
+from fastcontact.cases.decks.blocks import Block, Item, errors_at, key_of
 from fastcontact.cases.decks.conditions import Conditions
-from fastcontact.cases.decks.content import Content, PretensionSection, SectorEnds
+from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.generate.cut import cut
@@ -18,25 +19,29 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 
 
-def pretension_section(content: Content, block: Block) -> None:
-    """Read *PRE-TENSION SECTION: a surface across a bolt, and the node with the shortening and the force of the bolt."""
-    if len(block.rows) > 1:
-        raise block.error(f"{len(block.rows)} data lines, but at most one is allowed, the normal")
-    row = block.rows[0] if block.rows else None
-    normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
-    if normal is not None and not any(normal):
-        raise block.error("the normal is zero")
-    names = block.required("SURFACE"), block.required("NODE")
-    content.pretension_sections.append(PretensionSection(block.location, *names, normal))
+@dataclass(frozen=True)
+class PretensionSection(Item):
+    """A pretension section of a bolt: its surface, the node whose displacement is the shortening, and its normal [-]."""
+
+    surface: str
+    node: str
+    normal: tuple[float, ...] | None
 
 
 def sections_by_point(assembly: Assembly) -> dict[int, PretensionSection]:
     """Return the pretension sections by the points of their nodes.
 
-    Raises CaseError if the node of a section belongs to a body or to another section.
+    Raises CaseError if a normal is invalid, or if the node of a section belongs to a body or to another section.
     """
     sections: dict[int, PretensionSection] = {}
-    for section in assembly.content.pretension_sections:
+    for block in assembly.content.blocks["PRE-TENSION SECTION"]:
+        rows = block.rows
+        if len(rows) > 1:
+            raise block.error(f"{len(rows)} data lines, but at most one is allowed, the normal")
+        normal = (rows[0].number(0), rows[0].number(1, 0.0), rows[0].number(2, 0.0)) if rows else None
+        if normal is not None and not any(normal):
+            raise block.error("the normal is zero")
+        section = PretensionSection(block.location, block.required("SURFACE"), block.required("NODE"), normal)
         point = assembly.node(section.node, section.location)
         if point in assembly.solid_points:
             raise section.error(f"node {section.node} belongs to an element: a section needs a separate node")
@@ -61,18 +66,18 @@ def _locked_from(point: int, section: PretensionSection, conditions: Conditions)
     return None
 
 
-def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
-    """Return the mesh cut along all pretension sections.
+def cut_sections(deck_mesh: DeckMesh, mesh: Mesh, sections: Iterable[PretensionSection]) -> Mesh:
+    """Return the mesh cut along the pretension `sections`.
 
     Raises CaseError if a cut is impossible, or if a surface has two sections.
     """
-    sections: set[str] = set()
-    for section in deck_mesh.content.pretension_sections:
+    groups: set[str] = set()
+    for section in sections:
         deck_mesh.faces(section.surface, section.location)
         group = group_of_surface(deck_mesh, section.surface)
-        if group in sections:
+        if group in groups:
             raise section.error(f"surface '{group}' has a pretension section already")
-        sections.add(group)
+        groups.add(group)
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
         with errors_at(section):
             mesh = cut(mesh, group, normal)
@@ -103,8 +108,8 @@ def _orientation_sign(deck_mesh: DeckMesh, section: PretensionSection) -> float:
     if section.normal is None:
         return 1.0
     points, outward = deck_mesh.points, np.zeros(3)
-    for solid, facet in deck_mesh.faces(section.surface, section.location):
-        outward += points[list(facet_points(solid, facet))].mean(axis=0) - points[list(solid.points)].mean(axis=0)
+    for face in deck_mesh.faces(section.surface, section.location):
+        outward += points[list(face.points)].mean(axis=0) - points[list(face.solid.points)].mean(axis=0)
     return float(np.copysign(1.0, outward @ np.array(section.normal)))
 
 
@@ -112,15 +117,11 @@ def _orientation_sign(deck_mesh: DeckMesh, section: PretensionSection) -> float:
 MOST_SECTORS = 100_000
 
 
-def cyclic_symmetry_model(content: Content, block: Block) -> None:
-    """Store *CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
-    content.sectors.append(block)
-
-
 def add_sectors(model: Model, deck_mesh: DeckMesh) -> None:
     """Add the cyclic symmetries of a deck to the model."""
-    unused = list(deck_mesh.content.sector_ends)
-    for block in deck_mesh.content.sectors:
+    content = deck_mesh.content
+    unused = list(content.sector_ends)
+    for block in content.blocks["CYCLIC SYMMETRY MODEL"]:
         text = block.required("N")
         if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
             raise block.error(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
@@ -131,26 +132,28 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> None:
         direction = (second - first) / np.linalg.norm(second - first)
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
             raise block.error("the axis of a plane model is along z: give two points that differ in z only")
-        ends = _ends(deck_mesh.content, block)
+        ends = _ends(content, block)
         unused = [candidate for candidate in unused if candidate is not ends]
-        for name in ends.surfaces:
-            deck_mesh.faces(name, ends.location)
-        first_end, second_end = (group_of_surface(deck_mesh, name) for name in ends.surfaces)
+        tie, *names = ends
+        for name in names:
+            deck_mesh.faces(name, tie.location)
+        first_end, second_end = (group_of_surface(deck_mesh, name) for name in names)
         with errors_at(block):
             model.add_cyclic_symmetry(
                 first_end, second_end, sectors=int(text), origin=tuple(first[: model.mesh.dim].tolist()),
                 direction=tuple(direction.tolist()),
             )  # fmt: skip
-    for ends in unused:
-        raise ends.error("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
+    for tie, *_ in unused:
+        raise tie.error("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
 
 
-def _ends(content: Content, block: Block) -> SectorEnds:
-    """Return the sector ends of a *CYCLIC SYMMETRY MODEL: those of its TIE, or the only ones of the deck."""
-    tie = block.get("TIE")
-    matching = [ends for ends in content.sector_ends if not tie or key_of(ends.name) == key_of(tie)]
+def _ends(content: Content, block: Block) -> tuple[Block, str, str]:
+    """Return the sector ends that a *CYCLIC SYMMETRY MODEL names by its TIE, or the only ones of the deck."""
+    name = block.get("TIE")
+    matching = [ends for ends in content.sector_ends if not name or key_of(ends[0].get("NAME")) == key_of(name)]
     if len(matching) != 1:
-        names = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
-        parameter = f"TIE={tie[:80]}" if tie else "TIE is not given"
+        ties = [tie for tie, *_ in content.sector_ends]
+        names = ", ".join(tie.get("NAME") or f"that of line {tie.location.line}" for tie in ties) or "none"
+        parameter = f"TIE={name[:80]}" if name else "TIE is not given"
         raise block.error(f"{parameter}, and the ties with CYCLIC SYMMETRY are: {names}")
     return matching[0]

@@ -97,7 +97,7 @@ def condition(content: Content, step: Step | None, block: Block) -> None:
     if step is not None:
         step.conditions.append(block)
     elif block.keyword == "BOUNDARY":
-        content.supports.append(block)
+        content.blocks["BOUNDARY"].append(block)
     else:
         raise block.error("loads belong in a step")
 

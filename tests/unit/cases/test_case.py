@@ -183,7 +183,7 @@ MISTAKES = {
         ('generator = "half-spheres"', 'generator = "half-sphere"', r"mesh.generator 'half-sphere'.*'half-spheres'"),
         ('generator = "half-spheres"\n', "", r"either the key 'file' or the key 'generator'"),
         ("size = 10.0", "sise = 10.0", r"'mesh.sise': did you mean 'mesh.size'"),
-        ("x = 0.0", "x = true", r"'support\[0\].x' must be of type"),
+        ("x = 0.0", "x = true", r"'support\[0\].x' must be a number or a list .*, not the bool True"),
         ('group = "A1A2"\n', "", r"support\[0\] needs 'group'"),
         ("steps = 2", "steps = 2\ninstants = [1.0]", r"either 'instants', or 'steps'"),
         ("steps = 2", "steps = 2\ntable = [[0.0, 0.0, 1.0]]", r"list of pairs"),
@@ -192,7 +192,7 @@ MISTAKES = {
         ('primary = "CONT2"', 'primary = "CONT2"\nformulation = 3', r"'contact.hertz.formulation' must be a string"),
     ],
     LOADED: [
-        ("distribute = true", "distribute = 1", r"'force\[0\].distribute' must be of type bool"),
+        ("distribute = true", "distribute = 2", r"'force\[0\].distribute' must be true or false, not the int 2"),
         ("ramp = [[0.0, 1.0], [1.0, 1.0]]", "ramp = [[0.0]]", r"'support\[0\].ramp' must be|'support\[1\].ramp' must"),
         ('component = "y"\n', "", r"couple\[0\] needs 'component'"),
         ('["A2", "y", 1.0]', '["A2", "y"]', r"'relation\[0\].terms' must be a list of"),
@@ -203,7 +203,7 @@ MISTAKES = {
         ("half_space", "half_spaces", r"did you mean 'half_space'"),
         ("normal =", "normals =", r"'obstacle.plane.shape.normals'"),
         (", normal = [0.0, -1.0]", "", r"'obstacle.plane.shape' needs 'normal'"),
-        ("y = -2.0 }", 'y = "down" }', r"'obstacle.plane.motion.y' must be of type"),
+        ("y = -2.0 }", 'y = "down" }', r"'obstacle.plane.motion' must be a table of numbers by name"),
     ],
     SURFACE: [
         ('group = "TOOL"\n', "", r"'obstacle.plane.shape' needs 'group'"),
