@@ -20,7 +20,7 @@ from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import unchecked
 from fastcontact.analysis import thermal_coupling
 from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, with_work
-from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
+from fastcontact.analysis.equilibrium import StepEquilibrium
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.problem import Problem, StepLoad
@@ -151,7 +151,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     solution without contact is then used, see `StepContext.expected`.
     """
     load_as_force = load if load.rise is None else thermal_coupling.expansion_as_force(problem, load)
-    loaded = with_loads(problem, load_as_force)
+    loaded = problem.solver.load(problem.system.right_side(load_as_force.force, load_as_force.lift))
     round_off, rigid_force, expected = state.gap_round_off, state.largest_rigid_force, 0.0
     zero = np.zeros(len(load.lift))
     if problem.pairs and load_as_force.force.any() and not (state.u.any() or load.lift.any()):

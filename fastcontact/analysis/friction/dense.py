@@ -87,8 +87,8 @@ def solve(
     if guess is not None:
         guess = guess / (length * unit)
     for compliance in REGULARISATION if F.is_singular else (0.0,):
-        regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
-        F = F.softened(scattered(np.full(len(regularised), compliance), regularised, (len(F),)))
+        regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F.d)))
+        F = replace(F, d=F.d + scattered(np.full(len(regularised), compliance), regularised, F.d.shape))
         scaled_free = free * unit / length
         problem = _Problem(F, scaled_free, law, components, SUM_ROUND_OFF * largest(scaled_free))
         for start, line_search in problem.starts(closed, guess):
@@ -168,7 +168,7 @@ class _Problem:
         """
         compliance, last, halvings = NOTABLE, 1.0, 0
         while compliance > ROUND_OFF and halvings <= HALVINGS:
-            softened = replace(self, F=self.F.softened(compliance))
+            softened = replace(self, F=replace(self.F, d=self.F.d + compliance))
             forces = newton(softened, y, softened.gaps(y), min_iterations=1)
             if forces.settled:
                 y, last, compliance, halvings = forces.y, compliance, NOTABLE * compliance, 0

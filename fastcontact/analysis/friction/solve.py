@@ -155,14 +155,14 @@ def _with_included(
         y0, closing = (rotated(problem.Q, values) for values in path.along(constraints.directions, rows))
         result, gaps_of_included, before = problem.in_increments(y0, closing, path.waiting[rows])
         last_increment = _last_increment(before, problem.Q, rows, constraints)
-    y, gaps_of_included = (rotated(problem.Q, values, back=True) for values in (result.y, gaps_of_included))
+    y = rotated(problem.Q, result.y, back=True)
     u = loaded.involved_solution(R.T @ y.ravel()[components], u)
     all_forces, (active, sticking) = np.zeros((1 + k, m)), np.zeros((2, m), bool)
     gaps = constraints.gaps_at_rest() + (all_rows @ u).reshape(1 + k, m)
     all_forces[:, rows] = y
     if constraints.coupled:
         gaps += constraints.coupled_gaps(all_forces)
-    gaps[:, rows] = gaps_of_included
+    gaps[:, rows] = rotated(problem.Q, gaps_of_included, back=True)
     active[rows], sticking[rows] = result.closed, result.sticking
     return Solution(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
@@ -247,9 +247,7 @@ def _included_problem(
     free, F = delassus.of_rows(loaded, R, factored)
     number = numbers_at(components, (1 + k, q))
     # This compliance is added before held tangents are detected, since compliant tangents are not held.
-    F = F.softened(
-        np.vstack([np.zeros((1, q)), *k * [constraints.tangential_softness[None, rows]]]).ravel()[components]
-    )
+    F = replace(F, d=F.d + np.append(np.zeros(q), np.tile(constraints.tangential_softness[rows], k))[components])
     Q = aligning_rotation(F.diagonal_blocks(number)) if k == 2 else None
     Q_F = None if Q is None else csr_array(Q[components][:, components])
     C = F.rotated(Q_F).diagonal_blocks(number)
