@@ -61,6 +61,8 @@ class ActiveDofs:
         self.active, self.unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
         self.contact, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact, involved))
         self.springs = np.searchsorted(self.unknowns, springs)
+        self._numbers = np.full(len(all_dofs), -1, np.int32)  # of all unknowns among the active ones
+        self._numbers[self.unknowns] = np.arange(len(self.unknowns))
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free
         self._system, self.T = system, csr_array(csr_array(T)[self.active][:, self.unknowns])
@@ -80,11 +82,13 @@ class ActiveDofs:
         is removed from its row.
         """
         rows, offsets = [], np.vstack([constraints.gap0, constraints.slip0])
+        shape = len(constraints), len(self.unknowns)
         least = np.full((1 + len(constraints.tangents), len(constraints)), NOTABLE)
         least[0, constraints.softness > 0.0] = SINGLE_PRECISION
         for k, R in enumerate((constraints.B, *constraints.tangents)):
             reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
-            rows.append(without_round_off(csr_array(reduced[:, self.unknowns]), R, least[k]))
+            active = csr_array((reduced.data, self._numbers[reduced.indices], reduced.indptr), shape=shape)
+            rows.append(without_round_off(active, R, least[k]))
         prescribed = constraints.usable & (constraints.softness > 0.0) & (np.diff(rows[0].indptr) == 0)
         tangents, slip0 = tuple(rows[1:]), offsets[1:]
         return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tangents, slip0=slip0, prescribed=prescribed)

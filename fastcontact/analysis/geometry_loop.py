@@ -100,7 +100,10 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
     lift = step.load.lift if bodies is None else step.load.lift + bodies.rigid(u[bodies.dofs])
     condensed = problem.system.unknowns(u, lift)
     condensed[problem.dofs.unknowns] = 0.0
-    step = replace(step, loaded=step.loaded.condensed(), condensed_size=largest(condensed))
+    step = replace(
+        step, loaded=step.loaded.condensed(), condensed_size=largest(condensed),
+        linearises_contact=not (problem.solver.iterative or step.load.fluids),
+    )  # fmt: skip
     increments = FrictionIncrements(step)
     try:
         settled = _settle(step, iterate, increments, paired if step.linearises_contact else None)
@@ -122,6 +125,10 @@ def _settle(
     limit = criteria.max_geometry_updates if problem.until_settled else criteria.geometry_updates or 0
     # From a converged iterate, the loop continues without extrapolation and with accurate solutions.
     extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
+    # The errors of iterative solutions are about the tolerance times the contrast of cells. Smaller changes are not
+    # significant.
+    relative_error = problem.solver.tolerance * (problem.solver.contrast if problem.solver.iterative else 1.0)
+    relative_tolerance = max(criteria.geometry, relative_error)
     residual = problem.solver.tolerance
     if extrapolates:
         residual = max(residual, RESIDUAL * NOTABLE if step.state.extrapolation.ratio else NOTABLE)
@@ -164,7 +171,8 @@ def _settle(
             raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue
-        tolerance, is_exact = tolerances.geometry_tolerance(size), solution.settled and not accuracy.inexact
+        tolerance = max(relative_tolerance * size, step.state.gap_round_off)
+        is_exact = solution.settled and not accuracy.inexact
         if not accuracy.inexact:
             increments.update(constraints, solution, change - tolerance, size, iterate.u)
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=before[problem.dofs.contact])

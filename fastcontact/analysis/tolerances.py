@@ -88,16 +88,6 @@ class Tolerances:
             inexact=inexact,
         )
 
-    def geometry_tolerance(self, size: float) -> float:
-        """Return the change of the displacements below which the geometry has converged [length].
-
-        `size` is the largest displacement [length].
-        """
-        # The errors of iterative solutions are about the tolerance times the contrast of cells. Smaller changes are not
-        # significant.
-        relative_error = self.solver.tolerance * (self.solver.contrast if self.solver.iterative else 1.0)
-        return max(max(self.criteria.geometry, relative_error) * size, self.round_off)
-
 
 @dataclass(eq=False, repr=False)
 class ScatterWindow:

@@ -35,6 +35,7 @@ from fastcontact.analysis.solution import (
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.delassus import lu_solver
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
@@ -228,12 +229,23 @@ class _IncludedProblem:
 
     def response(self, loaded: Loaded, R: csr_array, row_numbers: Indices, result: FrictionSolution) -> Response:
         """Return the `Response` of the solution `result`; for R (n, n_unknowns) and `row_numbers` see `solution.response`."""
-        # Constraints that are equations have no friction, and slips along held tangents do not vary.
-        law = Law(np.where(self.equality, 0.0, self.mu), self.equality)
-        at_end = replace(result, sticking=result.sticking & ~self.equality)
-        Q = None if self.Q is None else csr_array(self.Q[self.components][:, self.components])
-        force_response = dense.response(self.F, law, at_end, self.held_slips, Q, self.components)
-        return response(loaded, R, row_numbers, force_response)
+        if not result.closed.any():
+            return response(loaded, R, row_numbers, np.zeros_like)
+        # Constraints that are equations have no friction.
+        law, sticking = Law(np.where(self.equality, 0.0, self.mu), self.equality), result.sticking & ~self.equality
+        unit, at = dense.units_of_force(self.F, len(self.mu)), self.components
+        F, y, gaps = self.F.scaled(unit[at % len(unit)]), result.y / unit, result.gaps * unit
+        equations = dense.linearised_equations(law, F, y, gaps, result.closed, sticking, at)
+        solve_dense = lu_solver(equations.A)
+        Q = None if self.Q is None else csr_array(self.Q[at][:, at])
+
+        def forces_of(gaps: Array) -> Array:
+            values = scattered(gaps if Q is None else Q @ gaps, at, result.y.shape) * unit
+            values[1:][self.held_slips] = 0.0  # slips along held tangents do not vary
+            change = (equations.forces(values, solve_dense) * unit).ravel()[at]
+            return change if Q is None else np.asarray(Q.T @ change)
+
+        return response(loaded, R, row_numbers, forces_of)
 
 
 def _included_problem(
