@@ -336,11 +336,11 @@ class StepEquilibrium:
             "history": history,
             **({} if scatter is None else {"scatter": scatter}),
         }
-        if self.terms is None:
-            return counts
-        keys = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
-        newton_sums = {name: sum(map(itemgetter(key), self.newton)) for name, key in keys.items()}
-        return {**counts, **newton_sums, "history": self.newton}
+        if self.terms is not None:
+            counts["history"] = self.newton
+            counts["geometry_updates"] = sum(map(itemgetter("pairings"), self.newton))
+            counts["active_set_iterations"] = sum(map(itemgetter("active_set_iterations"), self.newton))
+        return counts
 
 
 def solve_displacements(

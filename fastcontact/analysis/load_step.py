@@ -77,10 +77,9 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     step = replace(step, state=replace(step.state, wear=solution.wear))
-    if temperatures is None:
-        return _end_of_step(step, solution, instant, None, iterations)
-    end, result = _end_of_step(step, solution, instant, temperatures.rise, iterations)
-    return end, thermal_coupling.with_heat_results(problem, temperatures, result)
+    final_rise = None if temperatures is None else temperatures.rise
+    end, result = _end_of_step(step, solution, instant, final_rise, iterations)
+    return end, result if temperatures is None else thermal_coupling.with_heat_results(problem, temperatures, result)
 
 
 def _end_of_step(
