@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact.analysis.criteria import NOTABLE
-from fastcontact.arrays import Array, Indices, largest
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.sparse_rows import without_round_off
@@ -22,9 +22,9 @@ from fastcontact.round_off import SINGLE_PRECISION
 class ActiveDofs:
     """Degrees of freedom of the contact problem.
 
-    In the methods, `u` (n,) are all displacement components, `lift` (n,) those that supports and multi-point constraints
-    prescribe if all unknowns are zero, `active` (k,) the active components, for which the contact problem is solved, and
-    `v` (l,) the unknowns that determine the active components [length].
+    The contact problem is solved for the active components of the displacements. For displacements `lift` (n,) that supports
+    and multi-point constraints prescribe if all unknowns are zero, they are ``lift[active] + T @ v``, where v (l,) are the
+    active unknowns [length].
 
     Parameters
     ----------
@@ -42,6 +42,8 @@ class ActiveDofs:
     ----------
     active : ndarray of int (k,)
         The active components.
+    unknowns : ndarray of int (l,)
+        The active unknowns.
     contact : ndarray of int
         Positions, among the active components, of those that contact constraints may involve.
     determined : ndarray of int
@@ -56,24 +58,21 @@ class ActiveDofs:
 
     def __init__(self, system: System, contact: Indices, springs: Indices, unknowns: Indices | None = None) -> None:
         involved, all_dofs = np.union1d(contact, springs), np.arange(len(system.free))
-        self.active, self._unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
+        self.active, self.unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
         self.contact, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact, involved))
-        self.springs = np.searchsorted(self._unknowns, springs)
+        self.springs = np.searchsorted(self.unknowns, springs)
+        self._numbers = np.full(len(all_dofs), -1, np.int32)  # of all unknowns among the active ones
+        self._numbers[self.unknowns] = np.arange(len(self.unknowns))
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free
-        self._system, self.T = system, csr_array(csr_array(T)[self.active][:, self._unknowns])
+        self._system, self.T = system, csr_array(csr_array(T)[self.active][:, self.unknowns])
         self.transpose = csr_array(self.T.T)
-
-    def largest_condensed(self, u: Array, lift: Array) -> float:
-        """Return the largest absolute value of the unknowns of displacements `u` that are condensed."""
-        condensed = self._system.unknowns(u, lift)
-        condensed[self._unknowns] = 0.0
-        return largest(condensed)
 
     def constraints(self, constraints: Constraints, lift: Array, start: Array) -> Constraints:
         """Return constraints on all displacements as constraints on the active unknowns.
 
-        `start` (n,) are the displacements at the beginning of the load step, relative to which slips are measured [length].
+        `lift` (n,) are the displacements if all unknowns are zero, and `start` (n,) those at the beginning of the load step,
+        relative to which slips are measured [length].
 
         If supports hold both sides of a constraint, its force can neither close its gap nor stop its slip. After the
         supported unknowns are eliminated, its row contains only small entries of neighbouring nodes. Rows whose entries are
@@ -83,22 +82,13 @@ class ActiveDofs:
         is removed from its row.
         """
         rows, offsets = [], np.vstack([constraints.gap0, constraints.slip0])
+        shape = len(constraints), len(self.unknowns)
         least = np.full((1 + len(constraints.tangents), len(constraints)), NOTABLE)
         least[0, constraints.softness > 0.0] = SINGLE_PRECISION
         for k, R in enumerate((constraints.B, *constraints.tangents)):
             reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
-            rows.append(without_round_off(csr_array(reduced[:, self._unknowns]), R, least[k]))
+            active = csr_array((reduced.data, self._numbers[reduced.indices], reduced.indptr), shape=shape)
+            rows.append(without_round_off(active, R, least[k]))
         prescribed = constraints.usable & (constraints.softness > 0.0) & (np.diff(rows[0].indptr) == 0)
         tangents, slip0 = tuple(rows[1:]), offsets[1:]
         return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tangents, slip0=slip0, prescribed=prescribed)
-
-    def unknowns(self, u: Array, lift: Array | float = 0.0) -> Array:
-        """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints.
-
-        Several motions (n, k) without prescribed displacements may be given; their unknowns (l, k) are returned.
-        """
-        return self._system.unknowns(u, lift)[self._unknowns]
-
-    def displacement(self, v: Array, lift: Array) -> Array:
-        """Return the active components (k,) for active unknowns `v`."""
-        return np.asarray(lift[self.active] + self.T @ v)

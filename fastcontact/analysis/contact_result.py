@@ -345,30 +345,6 @@ def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows:
     return mean * np.divide(largest, length, out=np.ones_like(length), where=length > largest)[:, None]
 
 
-def sliding_load(
-    constraints: Constraints, solution: Solution, rows: slice, slip_integrals: Array, closed: Mask, side: Surface
-) -> Array:
-    """Return the integrals (n_nodes,) of the pressure over the slip in the step [pressure * length].
-
-    Parameters
-    ----------
-    constraints, solution, rows
-        See `contact_result`.
-    slip_integrals : ndarray (m,)
-        Integrals of the normal forces of the constraints over their slips [energy].
-    closed : ndarray of bool (n_nodes,)
-        Secondary nodes that are closed at the beginning or at the end of the step. Like the contact force, the integral is
-        distributed to them.
-    side : Surface
-        The secondary side.
-    """
-    # If the step is solved at once, slips of sticking constraints are elastic. If it is solved in increments, a constraint
-    # that sticks at the end may have slid before.
-    at_once = solution.integrals is None
-    sliding = np.where(solution.sticking[rows], 0.0, slip_integrals) if at_once else slip_integrals
-    return np.maximum(closed_node_pressures(constraints, constraints.normal_forces(sliding), closed, side)[1], 0.0)
-
-
 def with_work(
     pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
     contact: ContactResult, before: ContactForces | None,
@@ -378,11 +354,17 @@ def with_work(
     For the parameters, and for the last two values, see `contact_work`.
     """
     forces, work, slip_integrals = contact_work(pair, constraints, solution, rows, configuration, contact, before)
-    load_of_pair = None
+    sliding_load = None
     if pair.friction:
+        # If the step is solved at once, slips of sticking constraints are elastic. If it is solved in increments, a
+        # constraint that sticks at the end may have slid before.
+        at_once = solution.integrals is None
+        sliding = np.where(solution.sticking[rows], 0.0, slip_integrals) if at_once else slip_integrals
+        # Like the contact force, the integral is distributed to nodes that are closed at the beginning or at the end.
         closed = contact.active if before is None else contact.active | (before.pressing > 0.0)
-        load_of_pair = sliding_load(constraints, solution, rows, slip_integrals, closed, pair.secondary)
-    return replace(contact, dissipation=work[0], sliding_load=load_of_pair), forces, work
+        pressures = closed_node_pressures(constraints, constraints.normal_forces(sliding), closed, pair.secondary)[1]
+        sliding_load = np.maximum(pressures, 0.0)
+    return replace(contact, dissipation=work[0], sliding_load=sliding_load), forces, work
 
 
 def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:

@@ -30,7 +30,6 @@ from fastcontact.contact.wear_compliance import WearCompliance
 from fastcontact.elasticity.nonlinear_bodies import COMPLETE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.protocol import Loaded
 from fastcontact.linear.sparse_rows import sum_of_blocks
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
@@ -200,19 +199,15 @@ class Balance:
     energy: Energies = (0.0, 0.0)
 
     @property
-    def excess(self) -> float:
-        """Ratio of the residual to its bound [-]."""
-        return self.residual / self.bound if self.bound else float(np.inf if self.residual else 0.0)
-
-    @property
     def accuracy_factor(self) -> float:
-        """Factor by which the accuracy of linear solutions should increase [-].
+        """Factor by which the accuracy of linear solutions should increase, if the residual exceeds its bound [-].
 
         If the residual exceeds the level of round-off, and this level exceeds the bound, all forces may be round-off, for
         example after bodies have separated. The factor then only reduces the residual to the level of round-off, which
         requires a much lower accuracy than the bound.
         """
-        return self.residual / self.noise if self.residual > self.noise > self.bound else self.excess
+        target = self.noise if self.residual > self.noise > self.bound else self.bound
+        return self.residual / target if target else float(np.inf)
 
     def failure(self, index: int, problem: Problem, history: Sequence[dict[str, Any]]) -> ConvergenceError:
         """Return the error for step `index`, in which the residual exceeds its bound."""
@@ -341,16 +336,11 @@ class StepEquilibrium:
             "history": history,
             **({} if scatter is None else {"scatter": scatter}),
         }
-        if self.terms is None:
-            return counts
-        keys = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
-        newton_sums = {name: sum(map(itemgetter(key), self.newton)) for name, key in keys.items()}
-        return {**counts, **newton_sums, "history": self.newton}
-
-
-def with_loads(problem: Problem, load: StepLoad) -> Loaded:
-    """Return the prepared matrix of the problem with the right-hand side of a load."""
-    return problem.solver.load(problem.system.right_side(load.force, load.lift))
+        if self.terms is not None:
+            counts["history"] = self.newton
+            counts["geometry_updates"] = sum(map(itemgetter("pairings"), self.newton))
+            counts["active_set_iterations"] = sum(map(itemgetter("active_set_iterations"), self.newton))
+        return counts
 
 
 def solve_displacements(

@@ -213,7 +213,7 @@ class FloatingBodies:
         groups = [solid & group for group in (*moving.T, ~moving.any(axis=1))]
         typical = min(float(np.median(diagonal[group])) for group in groups if group.any())
         diagonal = np.where(no_stiffness, typical, diagonal)
-        self._dim = system.matrix.blocksize[0]
+        self._system, self._dim = system, system.matrix.blocksize[0]
         self.names = motions.names()
         weights = np.sqrt(np.maximum(diagonal, 0.0))
         # The unknowns with springs determine the amplitudes of the modes, are far apart and have large weights.
@@ -258,7 +258,7 @@ class FloatingBodies:
         """Return the linear response to positions of the springs, given `respond` for springs at a fixed position."""
         modes = self.motions.displacement
         changes = np.stack([rows @ modes for rows in (constraints.B, *constraints.tangents)])
-        rigid = dofs.unknowns(modes)
+        rigid = self._system.unknowns(modes)[dofs.unknowns]
         unloaded = np.zeros(len(rigid))
         strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(changes, -1, 0)], axis=1)
         return PositionResponse(respond, rigid + strained, strained[dofs.springs], dofs.springs, changes[0])
@@ -270,7 +270,8 @@ class FloatingBodies:
         """
         stiffness = (SINGLE_PRECISION if slides else SOFT) * self.stiffness
         modes = self._values_at_springs  # in terms of those with springs, which depend on the choice of nodes
-        return SoftSprings(loaded, dofs.unknowns(self.motions.displacement) @ modes, modes.T @ load, stiffness)
+        rigid = self._system.unknowns(self.motions.displacement)[dofs.unknowns]
+        return SoftSprings(loaded, rigid @ modes, modes.T @ load, stiffness)
 
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as a dict of numbers and strings.

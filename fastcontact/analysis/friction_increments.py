@@ -52,7 +52,7 @@ class FrictionIncrements:
         It has a `LoadPath` if increments are due, and is unchanged otherwise.
         """
         self.unfinished = False
-        if not (self.due or self._outdated(constraints, u)):
+        if not (self.due or (self._paired is not None and self._outdated(self._paired, constraints, u))):
             return step
         path = _path(step, constraints, nodes)
         self.due, self.unfinished, self._paired = False, path is not None, constraints
@@ -67,17 +67,18 @@ class FrictionIncrements:
         near = NOTABLE if self.step.linearises_contact else 0.0
         self._settled = shear_limit < 1.0 and solution.settled and excess <= near * size
         self._active, self._size = solution.active, size
-        self.due = self._outdated(constraints, u)
         if self._paired is None:
             self.due = self._settled and _slides(self.step, constraints, solution, shear_limit)
+        else:
+            self.due = self._outdated(self._paired, constraints, u)
 
-    def _outdated(self, constraints: StackedConstraints, u: Array) -> bool:
+    def _outdated(self, before: StackedConstraints, constraints: StackedConstraints, u: Array) -> bool:
         """Return whether the geometry has changed since the increments were solved, but by less than the last time.
 
         Slips of earlier increments are those of the pairing in which they were solved.
         """
-        before, start = self._paired, self.step.state.u
-        if before is None or not (self._settled and self.step.problem.until_settled):
+        start = self.step.state.u
+        if not (self._settled and self.step.problem.until_settled):
             return False
         if not len(before) == len(constraints) == len(self._active):  # slips of other constraints cannot be used
             return True

@@ -98,7 +98,12 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
     if not problem.pairs:
         return None
     lift = step.load.lift if bodies is None else step.load.lift + bodies.rigid(u[bodies.dofs])
-    step = replace(step, loaded=step.loaded.condensed(), condensed_size=problem.dofs.largest_condensed(u, lift))
+    condensed = problem.system.unknowns(u, lift)
+    condensed[problem.dofs.unknowns] = 0.0
+    step = replace(
+        step, loaded=step.loaded.condensed(), condensed_size=largest(condensed),
+        linearises_contact=not (problem.solver.iterative or step.load.fluids),
+    )  # fmt: skip
     increments = FrictionIncrements(step)
     try:
         settled = _settle(step, iterate, increments, paired if step.linearises_contact else None)
@@ -120,6 +125,10 @@ def _settle(
     limit = criteria.max_geometry_updates if problem.until_settled else criteria.geometry_updates or 0
     # From a converged iterate, the loop continues without extrapolation and with accurate solutions.
     extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
+    # The errors of iterative solutions are about the tolerance times the contrast of cells. Smaller changes are not
+    # significant.
+    relative_error = problem.solver.tolerance * (problem.solver.contrast if problem.solver.iterative else 1.0)
+    relative_tolerance = max(criteria.geometry, relative_error)
     residual = problem.solver.tolerance
     if extrapolates:
         residual = max(residual, RESIDUAL * NOTABLE if step.state.extrapolation.ratio else NOTABLE)
@@ -162,21 +171,22 @@ def _settle(
             raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue
-        tolerance = tolerances.geometry_tolerance(size)
-        if not tolerances.inexact:
+        tolerance = max(relative_tolerance * size, step.state.gap_round_off)
+        is_exact = solution.settled and not accuracy.inexact
+        if not accuracy.inexact:
             increments.update(constraints, solution, change - tolerance, size, iterate.u)
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=before[problem.dofs.contact])
-        if not solution.settled or tolerances.inexact:
-            window = ScatterWindow()
-        elif change <= tolerance and not (increments.due or increments.unfinished):
+        if is_exact and change <= tolerance and not (increments.due or increments.unfinished):
             return settled
+        if not (is_exact and change <= SINGLE_PRECISION * size):
+            window = ScatterWindow()
         elif scatter := window.add(displacement, settled.force, change, size, mixing.contraction):
             log.info(
                 "the contact geometry settled as far as round-off allows: displacements scatter by %.1e of the largest one, "
                 "contact forces by %.1e (Criteria.geometry = %g)", *scatter.values(), problem.criteria.geometry,
             )  # fmt: skip
             return replace(settled, scatter=scatter)
-        iterate.u[problem.dofs.active] = mixing.next(settled, before, displacement, tolerance, tolerances.inexact)
+        iterate.u[problem.dofs.active] = mixing.next(settled, before, displacement, tolerance, accuracy.inexact)
         tolerances.tighten(relative_change, solution.residual)
         is_slow = update >= max(limit // 2, UPDATES_BEFORE_ROUNDING) and not iterate.rounded
         if is_slow and any(pair.may_alternate(constraints.parts[name]) for name, pair in problem.pairs.items()):
@@ -253,8 +263,10 @@ class _Mixing:
         converge, because a solution without a Newton step is cheaper.
         """
         solution, change = settled.solution, largest(displacement - before)
-        if (shortened := self._shortened_step(before, displacement)) is not None:
-            return shortened
+        if self._line is not None:
+            shortened = self._shortened_step(before, displacement, *self._line)
+            if shortened is not None:
+                return shortened
         branches = settled.constraints.branches
         # While this state is constant, the solution depends smoothly on the geometry.
         state = solution.active.tobytes() + (b"" if branches is None else branches.tobytes())
@@ -288,15 +300,14 @@ class _Mixing:
             self.accelerated = Anderson(DEPTH, problem.dofs.contact, problem.solver.iterative)
         return self.accelerated.mixed(before, displacement)
 
-    def _shortened_step(self, before: Array, image: Array) -> Array | None:
+    def _shortened_step(
+        self, before: Array, image: Array, start: Array, step: Array, slope: float, fraction: float
+    ) -> Array | None:
         """Return a shorter Newton step if the last one, which ends at `before` (k,), is too long; None otherwise.
 
         Where cohesive layers soften, a step that is too long increases the energy. The derivative of the energy along the
         step has the opposite sign of the product of the step with the change to the solution, `image` (k,).
         """
-        if self._line is None:
-            return None
-        start, step, slope, fraction = self._line
         end_slope = float(step @ (image - before))
         # A minimum along the step lies between its start and its end. The secant of the slopes is limited for large ones.
         if end_slope >= -0.5 * slope or fraction <= 2.0**-HALVINGS:

@@ -116,11 +116,6 @@ class Heat:
     linear_tolerance: float
 
     @property
-    def depends_on_contact(self) -> bool:
-        """Whether temperatures depend on the contact, so that both problems are coupled."""
-        return any({"conductance", "friction_heat"} & set(pair.options) for pair in self.model.contact)
-
-    @property
     def finite_strain(self) -> bool:
         """Whether heat is conducted in the deformed bodies."""
         return self.model.strain == "finite"

@@ -135,6 +135,8 @@ class StepContext:
         Number of the step.
     condensed_size : float
         Largest absolute value of the unknowns that are condensed, at the beginning of the step [length].
+    linearises_contact : bool
+        Whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure.
     path : LoadPath or LastIncrement, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
@@ -147,12 +149,8 @@ class StepContext:
     expected: float = 0.0
     index: int = 0
     condensed_size: float = 0.0
+    linearises_contact: bool = False
     path: LoadPath | LastIncrement | None = None
-
-    @property
-    def linearises_contact(self) -> bool:
-        """Whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure."""
-        return not (self.problem.solver.iterative or self.load.fluids)
 
     def imposed_slips(self, constraints: Constraints) -> Array:
         """Return the slips that supports and obstacles impose in the step.
@@ -208,48 +206,43 @@ def solve_inequalities(
     displacement : ndarray (k,)
         Displacement components of `Problem.dofs` [length].
     """
-    pairing = step, constraints, iterate, active, accuracy
-    if (bodies := step.problem.floating_bodies) is not None:
-        return _FloatingContact(*pairing, bodies, iterate.u).settled()
-    solution = _PairingProblem(*pairing).solution(step.load.lift, iterate.u)
-    return solution, step.problem.dofs.displacement(solution.u, step.load.lift)
+    problem, lift = step.problem, step.load.lift
+    if problem.floating_bodies is not None:
+        contact = _FloatingContact(step, constraints, iterate, active, accuracy, problem.floating_bodies, iterate.u)
+        return contact.settled()
+    solution = _solution(step, constraints, iterate, active, accuracy, lift, iterate.u)
+    return solution, lift[problem.dofs.active] + problem.dofs.T @ solution.u
+
+
+def _solution(
+    step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array,
+    guess: Array,
+) -> Solution:  # fmt: skip
+    """Return the solution in the unknowns that remain after supports and multi-point constraints are eliminated.
+
+    `lift` (n_dofs,) are the displacements that supports and multi-point constraints prescribe if all unknowns are zero, and
+    `guess` (n_dofs,) are initial displacements [length]. For the other parameters see `solve_inequalities`.
+    """
+    problem, path, dofs = step.problem, step.path, step.problem.dofs
+    condensed = dofs.constraints(constraints, lift, step.state.u)
+    u = problem.system.unknowns(guess, lift)[dofs.unknowns]
+    if not condensed.tangents:
+        return active_set.solve(step.loaded, condensed, active, accuracy, u)
+    from fastcontact.analysis.friction import solve as friction
+
+    condensed = replace(condensed, driven=step.imposed_slips(constraints))
+    if isinstance(path, LastIncrement) and len(path.slip) == len(condensed):
+        condensed = path.since_its_beginning(condensed)
+        solution = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional)
+        iterate.frictional = path.over_whole_step(solution)
+    else:
+        path = path if isinstance(path, LoadPath) else None
+        iterate.frictional = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional, path)
+    return iterate.frictional
 
 
 @dataclass(eq=False, repr=False)
-class _PairingProblem:
-    """Contact problem of one pairing, see `solve_inequalities`."""
-
-    step: StepContext
-    constraints: Constraints
-    iterate: Iterate
-    active: Mask
-    accuracy: Accuracy
-
-    def solution(self, lift: Array, guess: Array) -> Solution:
-        """Return the solution in the unknowns that remain after supports and multi-point constraints are eliminated.
-
-        `lift` (n_dofs,) are the displacements that supports and multi-point constraints prescribe if all unknowns are zero,
-        and `guess` (n_dofs,) are initial displacements [length].
-        """
-        step, iterate, dofs = self.step, self.iterate, self.step.problem.dofs
-        condensed, u = dofs.constraints(self.constraints, lift, step.state.u), dofs.unknowns(guess, lift)
-        if not condensed.tangents:
-            return active_set.solve(step.loaded, condensed, self.active, self.accuracy, u)
-        from fastcontact.analysis.friction import solve as friction
-
-        condensed, path = replace(condensed, driven=step.imposed_slips(self.constraints)), step.path
-        if isinstance(path, LastIncrement) and len(path.slip) == len(condensed):
-            arguments = step.loaded, path.since_its_beginning(condensed), self.active, self.accuracy, u
-            iterate.frictional = path.over_whole_step(friction.solve(*arguments, iterate.frictional))
-        else:
-            arguments = step.loaded, condensed, self.active, self.accuracy, u
-            path = path if isinstance(path, LoadPath) else None
-            iterate.frictional = friction.solve(*arguments, iterate.frictional, path)
-        return iterate.frictional
-
-
-@dataclass(eq=False, repr=False)
-class _FloatingContact(_PairingProblem):
+class _FloatingContact:
     """Contact problem of one pairing if contact alone restrains some bodies, which springs hold.
 
     The springs are anchored at a rigid position of these bodies. `FloatingBodies.settle` iterates the position until the
@@ -257,13 +250,20 @@ class _FloatingContact(_PairingProblem):
 
     Attributes
     ----------
-    bodies : FloatingBodies
+    step, constraints, iterate, accuracy
+        See `solve_inequalities`.
     active : ndarray of bool (m,)
         Initial active set of the next solution.
+    bodies : FloatingBodies
     guess : ndarray (n_dofs,)
         Displacements of the last solution, the initial guess of the next one [length].
     """
 
+    step: StepContext
+    constraints: Constraints
+    iterate: Iterate
+    active: Mask
+    accuracy: Accuracy
     bodies: FloatingBodies
     guess: Array
 
@@ -304,20 +304,18 @@ class _FloatingContact(_PairingProblem):
     def loads(self) -> tuple[Array, float]:
         """Generalised forces (k,) of the loads in the free rigid-body modes [force], and the size of the model [length]."""
         problem, force = self.step.problem, self.step.load.force
-        if (
-            u := problem.linearised_at
-        ) is not None:  # residual forces, since a loaded tangent resists rigid-body rotations
-            force = force - problem.system.K @ self.bodies.strained(u)
+        if problem.linearised_at is not None:  # residual forces, since a loaded tangent resists rigid-body rotations
+            force = force - problem.system.K @ self.bodies.strained(problem.linearised_at)
         model_size = float(np.ptp(problem.model.mesh.points, axis=0).max())
         return generalised_forces(self.bodies.motions, force, self.step.state.largest_rigid_force), model_size
 
     def solve_at(self, anchor: Array, loaded: Loaded | None = None) -> Solution:
         """Return the solution with springs anchored at a rigid position (k,) [length]; `loaded` may contain other springs."""
         lift, dofs = self.step.load.lift + self.bodies.rigid(anchor), self.step.problem.dofs
-        problem = self if loaded is None else replace(self, step=replace(self.step, loaded=loaded))
-        solution = problem.solution(lift, self.guess)
+        step = self.step if loaded is None else replace(self.step, loaded=loaded)
+        solution = _solution(step, self.constraints, self.iterate, self.active, self.accuracy, lift, self.guess)
         self.active, self.guess = solution.wanted, self.guess.copy()
-        self.guess[dofs.active] = dofs.displacement(solution.u, lift)
+        self.guess[dofs.active] = lift[dofs.active] + dofs.T @ solution.u
         return solution
 
     def solve_on_soft_springs(self, anchor: Array, in_increments: bool) -> Solution:

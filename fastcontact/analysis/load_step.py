@@ -20,7 +20,7 @@ from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import unchecked
 from fastcontact.analysis import thermal_coupling
 from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, with_work
-from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
+from fastcontact.analysis.equilibrium import StepEquilibrium
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.problem import Problem, StepLoad
@@ -77,10 +77,9 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     step = replace(step, state=replace(step.state, wear=solution.wear))
-    if temperatures is None:
-        return _end_of_step(step, solution, instant, None, iterations)
-    end, result = _end_of_step(step, solution, instant, temperatures.rise, iterations)
-    return end, thermal_coupling.with_heat_results(problem, temperatures, result)
+    final_rise = None if temperatures is None else temperatures.rise
+    end, result = _end_of_step(step, solution, instant, final_rise, iterations)
+    return end, result if temperatures is None else thermal_coupling.with_heat_results(problem, temperatures, result)
 
 
 def _end_of_step(
@@ -151,7 +150,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     solution without contact is then used, see `StepContext.expected`.
     """
     load_as_force = load if load.rise is None else thermal_coupling.expansion_as_force(problem, load)
-    loaded = with_loads(problem, load_as_force)
+    loaded = problem.solver.load(problem.system.right_side(load_as_force.force, load_as_force.lift))
     round_off, rigid_force, expected = state.gap_round_off, state.largest_rigid_force, 0.0
     zero = np.zeros(len(load.lift))
     if problem.pairs and load_as_force.force.any() and not (state.u.any() or load.lift.any()):
@@ -201,15 +200,15 @@ def _contact_at_end(
     problem, start, load = step.problem, step.state, step.load
     displacement, solution = problem.displacement(end.u), settled.solution
     parts, rows_of_pairs = settled.constraints.parts, settled.constraints.rows
-    configurations = {name: problem.configuration(name, start, load, displacement, end.u) for name in parts}
-    first_contact = dict(start.first_contact)
-    for name, configuration in configurations.items():
+    configurations, first_contact = {}, dict(start.first_contact)
+    for name in parts:
+        configurations[name] = problem.configuration(name, start, load, displacement, end.u)
         if problem.model.mesh.dim == 3 and name not in first_contact:
-            first_contact[name] = problem.pairs[name].first_contact(configuration)
+            first_contact[name] = problem.pairs[name].first_contact(configurations[name])
     results = contact_results(problem, start, load, settled, replace(end, first_contact=first_contact))
-    touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
-    never_opening, worn, slipped = dict(start.never_opening), dict(start.worn), dict(start.slipped)
-    forces, elastic_slip, bonds, work_increments, work_on_wear = dict(start.forces), {}, {}, np.zeros(3), 0.0
+    touched, never_opening, worn = set(start.touched), dict(start.never_opening), dict(start.worn)
+    slipped, forces, elastic_slip, bonds = dict(start.slipped), dict(start.forces), {}, {}
+    work_increments, work_on_wear = np.zeros(3), 0.0
     for name, configuration in configurations.items():
         pair, constraints, rows = problem.pairs[name], parts[name], rows_of_pairs[name]
         if pair.options.kind == "bilateral_once_closed":
@@ -220,6 +219,8 @@ def _contact_at_end(
             slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
             elastic_slip[name] = constraints.positions, slips
         contact, slip = results[name], np.zeros_like(results[name].coordinates)
+        if contact.active.any():
+            touched.add(name)
         if contact.active.any() and pair.options.kind != "tied":
             rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
             slip = pair.nodal_slip(configuration)
@@ -246,7 +247,7 @@ def _contact_at_end(
     end = replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         last_change=settled.last_change, never_opening=never_opening, elastic_slip=elastic_slip, bonds=bonds, worn=worn,
-        wear={}, slipped=slipped, forces=forces, touched=touched,
+        wear={}, slipped=slipped, forces=forces, touched=frozenset(touched),
         first_contact={name: positions for name, positions in first_contact.items() if name in touched},
         work=start.work and start.work.after(energy, stored, work_increments.tolist(), released, work_on_wear),
     )  # fmt: skip
@@ -277,12 +278,10 @@ def recover(
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
-    loads, iterations = problem.model.loads, dict(iterations)
-    histories: dict[str, Any] = {
-        "temperature": problem.model.temperatures, "initial": problem.model.initial_states,
-        "pressure": [load for load in loads if isinstance(load, Pressure)],
-        "spin": [load for load in loads if isinstance(load, Centrifugal)],
-    }  # fmt: skip
+    iterations = dict(iterations)
+    histories: dict[str, Any] = {"temperature": problem.model.temperatures, "initial": problem.model.initial_states}
+    for name, kind in (("pressure", Pressure), ("spin", Centrifugal)):
+        histories[name] = [load for load in problem.model.loads if isinstance(load, kind)]
     factors = {name: problem.factors(parts, end.instant) for name, parts in histories.items()}
     iterations |= {f"{name}_factors": values for name, values in factors.items() if values}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise

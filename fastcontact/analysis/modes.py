@@ -11,10 +11,9 @@ from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.records import record
 from fastcontact.analysis.criteria import NOTABLE
-from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
 from fastcontact.analysis.modal.cyclic import Sectors, Wave, complex_eigenpairs, open_sector
 from fastcontact.analysis.modal.eigenpairs import Reduced, lowest_eigenpairs
-from fastcontact.analysis.modal.held_contact import Conditions, assembled, held_contact
+from fastcontact.analysis.modal.held_contact import Conditions, assembled, contact_stiffness, held_contact
 from fastcontact.analysis.modal.shapes import Modes
 from fastcontact.analysis.problem import near_nullspace
 from fastcontact.analysis.stages import stage_of
@@ -262,14 +261,18 @@ def _modes(
 
     They are those of the whole ring or of the modelled sector. The largest component of standing waves is positive.
     """
-    momentum, number = _momentum(vibration), sectors.number if whole_ring else 1
-    n_dofs, dim = momentum.shape
+    n_dofs, dim = vibration.M.shape[0], vibration.model.mesh.dim
+    velocities = np.tile(np.eye(dim), (n_dofs // dim, 1))  # uniform, along each axis
+    if vibration.model.kinematics == "axisymmetric":
+        velocities[:, 0] = 0.0  # cancels over the full circle
+    momentum, number = np.asarray(vibration.M @ velocities), sectors.number if whole_ring else 1
     rotations = [np.linalg.matrix_power(sectors.turn, k) for k in range(number)]
     values: list[float] = []
     shapes, participation, diameters, twins = [], [], [], []
     for wave, eigenvalues, displacements in eigenpairs:
         vectors = displacements[:n_dofs]  # without those of obstacles
-        vectors = (_with_positive_peak(vectors) if wave.is_standing else np.sqrt(2.0) * vectors) / np.sqrt(number)
+        peaks = vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]
+        vectors = vectors * (np.sign(peaks) if wave.is_standing else np.sqrt(2.0)) / np.sqrt(number)
         phases = np.exp(1j * wave.angle * np.arange(number))
         ring_momentum = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, rotations)
         for value, vector, momentum_of_mode in zip(eigenvalues.tolist(), vectors.T, ring_momentum, strict=True):
@@ -290,17 +293,3 @@ def _modes(
 
 def _frequencies(eigenvalues: Array) -> Array:
     return np.asarray(np.sign(eigenvalues) * np.sqrt(np.abs(eigenvalues)) / (2.0 * np.pi))
-
-
-def _momentum(vibration: _Vibration) -> Array:
-    """Return the momentum (n_dofs, dim) of uniform unit velocities along each axis [mass]."""
-    dim = vibration.model.mesh.dim
-    velocities = np.tile(np.eye(dim), (vibration.M.shape[0] // dim, 1))
-    if vibration.model.kinematics == "axisymmetric":
-        velocities[:, 0] = 0.0  # cancels over the full circle
-    return np.asarray(vibration.M @ velocities)
-
-
-def _with_positive_peak(vectors: Array) -> Array:
-    """Return vectors (size, n) whose largest component is positive."""
-    return np.asarray(vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]))

@@ -54,9 +54,30 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
     ConvergenceError
         If the iterations do not converge, a cell is inverted, or forces stay out of balance.
     """
+    if begin.problem.bodies is not None:
+        return _nonlinear_equilibrium(begin, load, before)
+    problem, start, u, settled = begin.problem, begin.state, begin.state.u, None
+    iterate = Iterate.of(start) if before is None or before.settled is None else before.settled.iterate
+    while True:  # until the forces balance, with more accurate linear solutions
+        if load is not begin.load or settled is not None:
+            loaded = problem.solver.load(problem.system.right_side(load.force, load.lift))
+            begin = replace(begin, load=load, loaded=loaded)
+        settled = settle_geometry(begin, iterate)
+        u, contact_force = equilibrium.solve_displacements(begin, settled, u)
+        force = problem.system.K @ u
+        internal = force, (0.5 * float(u @ force), 0.0)
+        force_balance = balance(problem, u, contact_force, load.force, start.largest_force, internal)
+        if iterate.history:
+            iterate.history[-1]["residual"] = force_balance.relative
+        if force_balance.residual <= force_balance.bound:
+            return StepEquilibrium(settled, u, force_balance)
+        if not problem.solver.improve(force_balance.accuracy_factor):
+            raise force_balance.failure(begin.index, problem, iterate.history)
+
+
+def _nonlinear_equilibrium(begin: StepContext, load: StepLoad, before: StepEquilibrium | None) -> StepEquilibrium:
+    """Return the result of `newton` for nonlinear bodies, from a predicted displacement if there is one."""
     start = begin.state
-    if begin.problem.bodies is None:
-        return _linear_equilibrium(begin, load, before)
     if before is not None or start.extrapolation.ratio:
         origin = start.extrapolation.predicted(start.u) if before is None else before.u
         try:
@@ -65,29 +86,6 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
             log.info("the step restarts from the previous displacement instead of a predicted one: %s", error)
             before = None
     return _Newton(begin, load, before).equilibrium_from(start.u)
-
-
-def _linear_equilibrium(begin: StepContext, load: StepLoad, before: StepEquilibrium | None) -> StepEquilibrium:
-    """Return the result of `newton` for linear bodies, whose tangents are constant.
-
-    Until the forces balance, the contact problem is solved again with more accurate linear solutions.
-    """
-    problem, start, u, settled = begin.problem, begin.state, begin.state.u, None
-    iterate = Iterate.of(start) if before is None or before.settled is None else before.settled.iterate
-    while True:
-        is_prepared = load is begin.load and settled is None
-        step = begin if is_prepared else replace(begin, load=load, loaded=equilibrium.with_loads(problem, load))
-        settled = settle_geometry(step, iterate)
-        u, contact_force = equilibrium.solve_displacements(step, settled, u)
-        force = problem.system.K @ u
-        internal = force, (0.5 * float(u @ force), 0.0)
-        force_balance = balance(problem, u, contact_force, load.force, start.largest_force, internal)
-        if iterate.history:
-            iterate.history[-1]["residual"] = force_balance.relative
-        if force_balance.excess <= 1.0 or not problem.solver.improve(force_balance.accuracy_factor):
-            if force_balance.residual > force_balance.bound:
-                raise force_balance.failure(begin.index, problem, iterate.history)
-            return StepEquilibrium(settled, u, force_balance)
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,7 @@ class _Newton:
                 break
             u, fraction = self._damped_step(before, target, changes)
             force_balance = self._force_balance(u, contact_force, before)
-            if history and fraction == 1.0 and force_balance.excess > 1.0:
+            if history and fraction == 1.0 and force_balance.residual > force_balance.bound:
                 u, fraction = self._line_search(before, u, contact_force)
                 force_balance = self._force_balance(u, contact_force, before) if fraction < 1.0 else force_balance
             change = largest(u - before)
@@ -163,7 +161,7 @@ class _Newton:
                 **({} if fraction == 1.0 else {"damped": fraction}),
             })  # fmt: skip
             small = self._has_converged(changes) or change <= self._start.gap_round_off
-            if fraction == 1.0 and force_balance.excess <= 1.0 and small:
+            if fraction == 1.0 and force_balance.residual <= force_balance.bound and small:
                 return StepEquilibrium(self._settled, u, force_balance, self._terms, history)
             self._has_full_step = fraction == 1.0 and not self._regularisation.linear
             u = self._accelerated(before, u, changes) if fraction == 1.0 else u
@@ -307,7 +305,8 @@ class _Newton:
         tolerance = min(max(problem.criteria.geometry, MAX_TOLERANCE * changes[-1]), NOTABLE)
         step = replace(
             self._begin, problem=replace(problem, criteria=replace(problem.criteria, geometry=tolerance)), load=load,
-            state=replace(self._start, extrapolation=Extrapolation()), loaded=equilibrium.with_loads(problem, load),
+            state=replace(self._start, extrapolation=Extrapolation()),
+            loaded=problem.solver.load(problem.system.right_side(load.force, load.lift)),
         )  # fmt: skip
         paired = self._settled if self._has_full_step and problem.linearised_at is None else None
         settled = settle_geometry(step, iterate, paired)

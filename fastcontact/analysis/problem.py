@@ -159,7 +159,7 @@ class Problem:
     heat: Heat | None = None
     linearised_at: Array | None = None
 
-    @property
+    @cached_property
     def until_settled(self) -> bool:
         """Whether the contact geometry is updated until displacements converge; otherwise the number of updates is fixed."""
         return self.criteria.geometry_updates is None and not self.criteria.keep_pairing
@@ -194,7 +194,7 @@ class Problem:
         """Whether load steps start from an extrapolation of earlier ones."""
         return self.solver.iterative or self.bodies is not None
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """Number of points, including one for each force-driven obstacle, and dimension."""
         n_points, dim = self.model.mesh.points.shape
@@ -245,7 +245,8 @@ class Problem:
 
         Prescribed displacements are those of `load`. Displacements of force-driven obstacles are taken from u (n_dofs,).
         """
-        return {**load.obstacles, **self.force_driven.displacements(u)}
+        driven = self.force_driven.displacements(u) if self.force_driven.pairs else {}
+        return {**load.obstacles, **driven}
 
     def configuration(self, name: str, state: State, load: StepLoad, displacement: Array, u: Array) -> Configuration:
         """Return the configuration of a contact pair.

@@ -47,7 +47,8 @@ def with_heat_results(problem: Problem, temperatures: Temperatures, step: StepRe
 
 def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Array:
     """Return the initial temperature rise (n_points,) of a load step [temperature]."""
-    if not (heat.depends_on_contact or heat.finite_strain):
+    depends_on_contact = any({"conductance", "friction_heat"} & set(pair.options) for pair in problem.model.contact)
+    if not (depends_on_contact or heat.finite_strain):
         return heat.temperatures(instant).rise
     return np.zeros(problem.model.mesh.n_points) if state.rise is None else state.rise
 

@@ -61,11 +61,6 @@ class Tolerances:
     round_off: float
     first_scale: float
 
-    @property
-    def inexact(self) -> bool:
-        """Whether the current tolerance is larger than that of the solver, so that the step cannot end yet."""
-        return self.solver.iterative and self.residual > self.solver.tolerance
-
     def tighten(self, relative_change: float, law_residual: float = 0.0) -> None:
         """Reduce the tolerance of linear solutions according to the last relative change of the displacements.
 
@@ -80,27 +75,18 @@ class Tolerances:
     def accuracy(self, scale: float) -> Accuracy:
         """Return the tolerances and limits of the next contact solution, for displacements of the size `scale` [length].
 
-        While linear solutions are inexact, surfaces are paired again after one iteration of the active set or one Newton step
-        of friction.
+        While linear solutions are inexact, because their tolerance is larger than that of the solver, the step cannot
+        end. Surfaces are then paired again after one iteration of the active set or one Newton step of friction.
         """
+        inexact = self.solver.iterative and self.residual > self.solver.tolerance
         relative_error = max(10 * self.solver.tolerance, self.residual if self.solver.iterative else 0.0)
         return Accuracy(
             gap=max(relative_error * (scale or self.first_scale), self.round_off),
             multiplier=relative_error,
             residual=self.residual,
-            max_iterations=1 if self.inexact else self.criteria.max_active_set_iterations,
-            inexact=self.inexact,
+            max_iterations=1 if inexact else self.criteria.max_active_set_iterations,
+            inexact=inexact,
         )
-
-    def geometry_tolerance(self, size: float) -> float:
-        """Return the change of the displacements below which the geometry has converged [length].
-
-        `size` is the largest displacement [length].
-        """
-        # The errors of iterative solutions are about the tolerance times the contrast of cells. Smaller changes are not
-        # significant.
-        relative_error = self.solver.tolerance * (self.solver.contrast if self.solver.iterative else 1.0)
-        return max(max(self.criteria.geometry, relative_error) * size, self.round_off)
 
 
 @dataclass(eq=False, repr=False)
@@ -112,7 +98,7 @@ class ScatterWindow:
     def add(
         self, displacement: Array, force: Array, change: float, size: float, contraction: float = np.inf
     ) -> dict[str, float] | None:
-        """Add an update to the window, and return the scatter of the window.
+        """Add an update whose change may be round-off to the window, and return the scatter of the window.
 
         Parameters
         ----------
@@ -134,9 +120,6 @@ class ScatterWindow:
             Scatter of the displacements, ``displacement``, and of the nodal contact forces, ``force``, each relative to the
             largest one [-]. None if the updates may still converge, or if they scatter by more than is acceptable.
         """
-        if not change <= SINGLE_PRECISION * size:
-            self._window.clear()
-            return None
         self._window.append((displacement.copy(), force.copy(), change))
         contracts = contraction <= DECLINE and change <= LENGTH_ROUND_OFF * size
         window = WINDOW // 2 if contracts else WINDOW

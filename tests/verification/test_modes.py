@@ -10,7 +10,7 @@ from refusals import refused
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis.modal.contact_stiffness import contact_stiffness
+from fastcontact.analysis.modal.held_contact import contact_stiffness
 from fastcontact.cli import main
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.held_motions import HeldMotions

@@ -40,9 +40,6 @@ class Delassus:
     S: Array
     U: csr_array | None = None
 
-    def __len__(self) -> int:
-        return len(self.d)
-
     def __matmul__(self, x: Array) -> Array:
         product = self.S @ x if self.U is None else self.U @ (self.S @ (self.U.T @ x))
         return np.asarray(product + (self.d * x.T).T)
@@ -67,10 +64,6 @@ class Delassus:
         values = values + np.where(number[:, None] == number, self.d[number], 0.0)
         return np.where(given[:, None] & given, values, 0.0)
 
-    def softened(self, softness: Array | float) -> Delassus:
-        """Return the sum of F and the diagonal matrix of `softness` (n,) [length / force]."""
-        return replace(self, d=self.d + softness)
-
     def scaled(self, units: Array) -> Delassus:
         """Return F, whose rows and columns are multiplied by `units` (n,)."""
         if self.U is None:
@@ -79,9 +72,11 @@ class Delassus:
 
     def decoupled(self, n: Indices, diagonal: Array) -> Delassus:
         """Return F with zeros in the rows and columns `n` (q,), except for the values `diagonal` (q,) on the diagonal."""
-        units, softness = np.ones(len(self)), np.zeros(len(self))
-        units[n], softness[n] = 0.0, diagonal
-        return self.scaled(units).softened(softness)
+        units = np.ones(len(self.d))
+        units[n] = 0.0
+        decoupled = self.scaled(units)
+        decoupled.d[n] = diagonal
+        return decoupled
 
     def rotated(self, Q: csr_array | None) -> Delassus:
         """Return ``Q F Q.T`` for a matrix Q (n, n) that only rotates components with the same value of d; F without Q."""
@@ -160,15 +155,15 @@ def with_compliance(F: Delassus, constraints: Constraints, rows: Indices, compon
         added = np.where(d > 0.0, 0.0, F.diagonal()[: len(rows)])  # and subtracted in the next term
         (rigid,) = np.nonzero(added[number])
         columns = [scaled(P[number], along_axis) for along_axis in frame.T]
-        columns += [csr_array((np.ones(len(rigid)), (rigid, np.arange(len(rigid)))), (len(F), len(rigid)))]
+        columns += [csr_array((np.ones(len(rigid)), (rigid, np.arange(len(rigid)))), (len(F.d), len(rigid)))]
         S = block_diag(F.S, *dim * [-inverse_mass], -np.diag(added[number[rigid]]), np.eye(Z.shape[1]))
         U = csc_array(hstack([F.U, *columns, csr_array(Z)], format="csc"))
         used = np.flatnonzero(np.diff(U.indptr))
         F = Delassus(F.d + (d + added)[number], S[np.ix_(used, used)], csr_array(U[:, used])).in_accurate_form()
-        check_rows(len(F) if F.U is None else len(used), MAX_ROWS_WITH_FRICTION)
+        check_rows(len(F.d) if F.U is None else len(used), MAX_ROWS_WITH_FRICTION)
     else:
         if constraints.compliance is not None:
             F.S[:] += constraints.compliance.block(rows)[np.ix_(number, number)] * (frame @ frame.T)
         if Z.size:
             F.S[:] += Z @ Z.T
-    return F.softened(np.append(constraints.softness[rows], np.zeros(len(F) - len(rows))))
+    return replace(F, d=F.d + np.append(constraints.softness[rows], np.zeros(len(F.d) - len(rows))))

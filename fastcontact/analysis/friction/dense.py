@@ -29,7 +29,6 @@ from fastcontact.analysis.friction.cone_newton import Law, newton
 from fastcontact.analysis.friction.delassus import Delassus
 from fastcontact.analysis.solution import FrictionSolution
 from fastcontact.arrays import Array, Indices, Mask, largest
-from fastcontact.linear.delassus import lu_solver
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, SUM_ROUND_OFF
 
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
@@ -79,7 +78,7 @@ def solve(
     law = Law(np.where(equality, 0.0, mu), equality)
     if not m:
         return FrictionSolution(free * 0.0, free, closed, closed, True, 0.0, 0)
-    unit = _units(F, m)
+    unit = units_of_force(F, m)
     length = largest(free * unit) or 1.0
     components = np.arange(free.size) if components is None else components
     units = unit[components % m]
@@ -87,8 +86,8 @@ def solve(
     if guess is not None:
         guess = guess / (length * unit)
     for compliance in REGULARISATION if F.is_singular else (0.0,):
-        regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
-        F = F.softened(scattered(np.full(len(regularised), compliance), regularised, (len(F),)))
+        regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F.d)))
+        F = replace(F, d=F.d + scattered(np.full(len(regularised), compliance), regularised, F.d.shape))
         scaled_free = free * unit / length
         problem = _Problem(F, scaled_free, law, components, SUM_ROUND_OFF * largest(scaled_free))
         for start, line_search in problem.starts(closed, guess):
@@ -133,7 +132,7 @@ class _Problem:
         """See `cone_newton.Linearised`."""
         if not closed.any():
             return np.zeros_like(y), self.free
-        equations = _equations(self.law, self.F, y, gaps, closed, sticking, self.components)
+        equations = linearised_equations(self.law, self.F, y, gaps, closed, sticking, self.components)
         forces = equations.forces(self.free, partial(_dense_solution, equations.A))
         return forces, self.gaps(forces)
 
@@ -168,7 +167,7 @@ class _Problem:
         """
         compliance, last, halvings = NOTABLE, 1.0, 0
         while compliance > ROUND_OFF and halvings <= HALVINGS:
-            softened = replace(self, F=self.F.softened(compliance))
+            softened = replace(self, F=replace(self.F, d=self.F.d + compliance))
             forces = newton(softened, y, softened.gaps(y), min_iterations=1)
             if forces.settled:
                 y, last, compliance, halvings = forces.y, compliance, NOTABLE * compliance, 0
@@ -191,12 +190,8 @@ def numbers_at(at: Indices, shape: tuple[int, ...]) -> Indices:
     return result
 
 
-# Linear map from a change (n,) of the gaps and slips without forces to the change (n,) of the forces.
-ForceResponse = Callable[[Array], Array]
-
-
 @record
-class _Equations:
+class Equations:
     """The equations of closed constraints for their q forces x: ``A z = -S T free`` with ``x = -H free + back z``.
 
     They are equivalent to ``(E + D F) x = -D free`` with E and D of `Law.linearised`; see `delassus`. Without S, it is the
@@ -217,9 +212,9 @@ class _Equations:
         return scattered(self.back @ solve(-right_side) - self.H @ values, self.at, free.shape)
 
 
-def _equations(
+def linearised_equations(
     law: Law, F: Delassus, y: Array, gaps: Array, closed: Mask, sticking: Mask, components: Indices
-) -> _Equations:
+) -> Equations:
     """Return the equations of the `closed` constraints; F belongs to the `components`, see `solve`."""
     rows, selected = np.flatnonzero(closed), np.flatnonzero(closed[components % len(closed)])
     number, n = numbers_at(components[selected], y.shape)[:, rows], len(selected)
@@ -237,43 +232,16 @@ def _equations(
         F_matrix[np.arange(n), np.arange(n)] += F.d
         A = np.asarray(D_matrix @ F_matrix)
         A += matrix(E)
-        return _Equations(A, None, D_matrix, csr_array((n, n)), csr_array(eye_array(n)), at)
+        return Equations(A, None, D_matrix, csr_array((n, n)), csr_array(eye_array(n)), at)
     blocks, D_blocks = E + D * np.where(number >= 0, F.d[number], 1.0), D.transpose(2, 0, 1)
     H = matrix(np.asarray(np.linalg.solve(blocks.transpose(2, 0, 1), D_blocks)).transpose(1, 2, 0))
     HU, S = csr_array(H @ F.U), F.S
     T = csr_array(F.U.T @ H)
     A = np.asarray(csr_array((F.U.T @ HU).T) @ S).T + np.eye(len(S))
-    return _Equations(A, S, T, H, -HU, at)
+    return Equations(A, S, T, H, -HU, at)
 
 
-def response(
-    F: Delassus, law: Law, forces: FrictionSolution, held_slips: Mask, Q: csr_array | None, components: Indices
-) -> ForceResponse:
-    """Return the derivative of the solution `forces`, along the `components`.
-
-    F, the constraints of `law` and the components are those of `solve`. Q is the rotation of the tangents, if these are
-    rotated. Along the held tangents, `held_slips` (k, m), slips do not vary.
-    """
-    if not forces.closed.any():
-        return np.zeros_like
-    m = len(law.mu)
-    unit = _units(F, m)
-    units = unit[components % m]
-    equations = _equations(
-        law, F.scaled(units), forces.y / unit, forces.gaps * unit, forces.closed, forces.sticking, components
-    )
-    solve_dense = lu_solver(equations.A)
-
-    def force_change(gaps: Array) -> Array:
-        values = scattered(gaps if Q is None else Q @ gaps, components, forces.y.shape) * unit
-        values[1:][held_slips] = 0.0
-        change = (equations.forces(values, solve_dense) * unit).ravel()[components]
-        return change if Q is None else np.asarray(Q.T @ change)
-
-    return force_change
-
-
-def _units(F: Delassus, m: int) -> Array:
+def units_of_force(F: Delassus, m: int) -> Array:
     """Return the units (m,) of force in which the compliance of each gap is one.
 
     The parameter of the complementarity function, which multiplies gaps and slips, can then be one for all constraints.

@@ -35,6 +35,7 @@ from fastcontact.analysis.solution import (
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.delassus import lu_solver
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
@@ -155,14 +156,14 @@ def _with_included(
         y0, closing = (rotated(problem.Q, values) for values in path.along(constraints.directions, rows))
         result, gaps_of_included, before = problem.in_increments(y0, closing, path.waiting[rows])
         last_increment = _last_increment(before, problem.Q, rows, constraints)
-    y, gaps_of_included = (rotated(problem.Q, values, back=True) for values in (result.y, gaps_of_included))
+    y = rotated(problem.Q, result.y, back=True)
     u = loaded.involved_solution(R.T @ y.ravel()[components], u)
     all_forces, (active, sticking) = np.zeros((1 + k, m)), np.zeros((2, m), bool)
     gaps = constraints.gaps_at_rest() + (all_rows @ u).reshape(1 + k, m)
     all_forces[:, rows] = y
     if constraints.coupled:
         gaps += constraints.coupled_gaps(all_forces)
-    gaps[:, rows] = gaps_of_included
+    gaps[:, rows] = rotated(problem.Q, gaps_of_included, back=True)
     active[rows], sticking[rows] = result.closed, result.sticking
     return Solution(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
@@ -228,12 +229,23 @@ class _IncludedProblem:
 
     def response(self, loaded: Loaded, R: csr_array, row_numbers: Indices, result: FrictionSolution) -> Response:
         """Return the `Response` of the solution `result`; for R (n, n_unknowns) and `row_numbers` see `solution.response`."""
-        # Constraints that are equations have no friction, and slips along held tangents do not vary.
-        law = Law(np.where(self.equality, 0.0, self.mu), self.equality)
-        at_end = replace(result, sticking=result.sticking & ~self.equality)
-        Q = None if self.Q is None else csr_array(self.Q[self.components][:, self.components])
-        force_response = dense.response(self.F, law, at_end, self.held_slips, Q, self.components)
-        return response(loaded, R, row_numbers, force_response)
+        if not result.closed.any():
+            return response(loaded, R, row_numbers, np.zeros_like)
+        # Constraints that are equations have no friction.
+        law, sticking = Law(np.where(self.equality, 0.0, self.mu), self.equality), result.sticking & ~self.equality
+        unit, at = dense.units_of_force(self.F, len(self.mu)), self.components
+        F, y, gaps = self.F.scaled(unit[at % len(unit)]), result.y / unit, result.gaps * unit
+        equations = dense.linearised_equations(law, F, y, gaps, result.closed, sticking, at)
+        solve_dense = lu_solver(equations.A)
+        Q = None if self.Q is None else csr_array(self.Q[at][:, at])
+
+        def forces_of(gaps: Array) -> Array:
+            values = scattered(gaps if Q is None else Q @ gaps, at, result.y.shape) * unit
+            values[1:][self.held_slips] = 0.0  # slips along held tangents do not vary
+            change = (equations.forces(values, solve_dense) * unit).ravel()[at]
+            return change if Q is None else np.asarray(Q.T @ change)
+
+        return response(loaded, R, row_numbers, forces_of)
 
 
 def _included_problem(
@@ -247,9 +259,7 @@ def _included_problem(
     free, F = delassus.of_rows(loaded, R, factored)
     number = numbers_at(components, (1 + k, q))
     # This compliance is added before held tangents are detected, since compliant tangents are not held.
-    F = F.softened(
-        np.vstack([np.zeros((1, q)), *k * [constraints.tangential_softness[None, rows]]]).ravel()[components]
-    )
+    F = replace(F, d=F.d + np.append(np.zeros(q), np.tile(constraints.tangential_softness[rows], k))[components])
     Q = aligning_rotation(F.diagonal_blocks(number)) if k == 2 else None
     Q_F = None if Q is None else csr_array(Q[components][:, components])
     C = F.rotated(Q_F).diagonal_blocks(number)

@@ -97,34 +97,27 @@ class Adjoint:
 
     def derivatives(self, changes: Sequence[Change]) -> Array:
         """Return the derivatives (q,) of the quantity with respect to parameters, whose lifts are those of `moving`."""
-        lifted = self._lifted.toarray().T
-        return np.array([self._derivative(change, column) for change, column in zip(changes, lifted, strict=True)])
+        gradient, n, values = self._gradient, len(self._contact.u), np.zeros(len(changes))
+        for i, (change, lifted) in enumerate(zip(changes, self._lifted.toarray().T, strict=True)):
+            sample = change.sample + largest(change.lift) * lifted
+            residual = change.residual + self._system.K @ change.lift - sample[:n]
+            gap = sample[n : n + self._k] + self._B @ change.lift
+            values[i] = gradient.displacement @ change.lift - self._w @ self._system.reduced(residual) - self._mu @ gap
+            if gradient.sample is not None:
+                values[i] += gradient.sample @ sample
+            if gradient.reaction is not None:
+                values[i] += gradient.reaction @ residual
+        return values
 
-    def _derivative(self, change: Change, lifted: Array) -> float:
-        gradient, n = self._gradient, len(self._contact.u)
-        sample = change.sample + largest(change.lift) * lifted
-        residual = change.residual + self._system.K @ change.lift - sample[:n]
-        gap = sample[n : n + self._k] + self._B @ change.lift
-        derivative = gradient.displacement @ change.lift - self._w @ self._system.reduced(residual) - self._mu @ gap
-        if gradient.sample is not None:
-            derivative += gradient.sample @ sample
-        if gradient.reaction is not None:
-            derivative += gradient.reaction @ residual
-        return float(derivative)
-
-    def _right_side(self) -> tuple[Array, Array]:
-        """Return the derivatives of the quantity with respect to all unknowns (n,) and the multipliers (k,)."""
+    def _solve(self) -> tuple[Array, Array]:
         gradient = self._gradient
+        # Derivatives of the quantity with respect to all unknowns (n,) and the multipliers (k,).
         right_side, multiplier = self._system.reduced(gradient.displacement), gradient.multiplier.copy()
         if gradient.sample is not None:
             right_side += self._moving.T @ gradient.sample
         if gradient.reaction is not None:
             right_side += self._system.reduced(self._system.K @ gradient.reaction) - self._force.T @ gradient.reaction
             multiplier -= self._B @ gradient.reaction
-        return right_side, multiplier
-
-    def _solve(self) -> tuple[Array, Array]:
-        right_side, multiplier = self._right_side()
         w, mu = self._saddle_point_solution(right_side, multiplier)
         pairing_terms = self._pairing_product(w, mu)
         if not pairing_terms.any():

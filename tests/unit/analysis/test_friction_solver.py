@@ -45,7 +45,7 @@ def componentwise(C, along):
     rows = csr_array((m, m * dim))
     positions = np.zeros((m, dim))
     constraints = Constraints(rows, np.zeros(m), positions, DenseCompliance(C), k * (rows,), tuple(along))
-    return delassus.with_compliance(F, constraints, np.arange(m), np.arange(len(F))).S
+    return delassus.with_compliance(F, constraints, np.arange(m), np.arange(len(F.d))).S
 
 
 @pytest.mark.parametrize("dim", [2, 3])
