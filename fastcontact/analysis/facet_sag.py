@@ -19,7 +19,6 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import fine_rule, gauss_rule
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
-from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.mesh import elements, quadrature
@@ -78,7 +77,7 @@ def _inclination(pair: Formulation, configuration: Configuration, contact: Conta
     """
     if pair.name != "node_to_segment" or pair.normals != "facet" or not pair.friction:
         return ""
-    smooth = -nodal_normals(pair.secondary, pair.points + configuration.displacement)
+    smooth = -configuration.deformed(pair.secondary, pair.points).nodal_normals
     force, traction = (contact.force_vectors * contact.normal).sum(axis=1), np.linalg.norm(contact.shear, axis=1)
     along = contact.shear / np.maximum(traction, TINY)[:, None]
     inclination = ((contact.normal - smooth) * along).sum(axis=1)

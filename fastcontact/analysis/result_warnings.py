@@ -25,6 +25,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
+from fastcontact.contact.supported_nodes import nodes_with_undetermined_traction
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.topology import bodies
@@ -88,7 +89,7 @@ def result_warnings(
         if pair.options.kind == "gap_only":
             continue
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
-        undetermined = _undetermined_tractions(pair, contact, pair.nodes_with_undetermined_traction(configuration))
+        undetermined = _undetermined_tractions(pair, contact, nodes_with_undetermined_traction(pair, configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *_open_contact(problem, state, name, last, loaded)]
         warnings += undetermined
         unresolved = _unresolved(pair, configuration, contact, state)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastcontact._tools.records import record
+from fastcontact._tools.records import field, record
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 from fastcontact.contact.obstacles.rigid_side import Pose
+from fastcontact.contact.projection import DeformedSide
+from fastcontact.contact.surface import Surface
 from fastcontact.contact.wear_compliance import WearCompliance
 
 
@@ -65,6 +67,14 @@ class Configuration:
     rounded: bool = False
     linearisation_point: Array | None = None
     friction_factor: float = 1.0
+
+    _sides: dict[Surface, DeformedSide] = field(default_factory=dict, init=False)
+
+    def deformed(self, side: Surface, points: Array) -> DeformedSide:
+        """Return a side in this configuration, given the undeformed `points` (n_points, dim) of the mesh [length]."""
+        if side not in self._sides:
+            self._sides[side] = DeformedSide(side, points + self.displacement)
+        return self._sides[side]
 
     @classmethod
     def displaced(cls, displacement: Array) -> Configuration:

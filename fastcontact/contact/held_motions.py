@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import CORNER, nodal_normals
+from fastcontact._tools.records import record, replace
+from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.contact.projection import CORNER, DeformedSide
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.multipoint_constraints import eliminate
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
@@ -200,7 +200,7 @@ def symmetry_planes(
     tolerance, planes = PLANE_TOLERANCE * float(np.ptp(points, axis=0).max()), []
     # Facets may be short compared with the surface: nodes next to the plane do not belong to it.
     within = np.minimum(tolerance, 0.25 * surface.largest_diameters(coordinates))
-    normals = nodal_normals(surface, coordinates)
+    normals = DeformedSide(surface, coordinates).nodal_normals
     for axis in _held_directions(held[partly_held]):
         x, x_opposite = points @ axis, opposite @ axis
         components = np.abs(axis) > PLANE_TOLERANCE
@@ -215,6 +215,41 @@ def symmetry_planes(
             if len(nodes) and on_plane.all():
                 planes.append((axis, nodes))
     return planes
+
+
+def reflected(side: Surface, motions: HeldMotions | None, coordinates: Array, opposite: Numbers) -> Surface:
+    """Return a side whose averaged normals at planes of symmetry are those of the full model; see `symmetry_planes`.
+
+    `coordinates` (n_points, dim) are the reference coordinates of all points [length], and `opposite` the nodes of the other
+    side.
+    """
+    if motions is None or not np.isin(side.points, motions.nodes).any():
+        return side
+    across = np.zeros((len(side.points), *2 * (coordinates.shape[1],)))  # projectors onto the normals of the planes
+    for axis, nodes in symmetry_planes(motions, side, coordinates, coordinates[opposite]):
+        held = motions.projectors_at(side.points[nodes]) @ axis
+        across[nodes] += held[:, :, None] * held[:, None]
+    across = without_complete_facets(across, side)
+    nodes = np.flatnonzero(across.any(axis=(1, 2)))
+    if not len(nodes):
+        return side
+    reflections = np.eye(coordinates.shape[1]) - 2.0 * across[nodes]
+    return replace(side, periodic_ends=(*side.periodic_ends, (nodes, nodes, reflections)))
+
+
+def without_complete_facets(held: Array, side: Surface) -> Array:
+    """Return projectors (n_nodes, dim, dim) without directions in which all nodes of a facet are held.
+
+    `held` (n_nodes, dim, dim) are the projectors onto the directions in which the nodes of `side` are held.
+    """
+    span = np.zeros_like(held)
+    for block in side.blocks:
+        projectors = held[block.local]
+        vectors = np.linalg.eigh(projectors.mean(axis=1))[1]
+        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, projectors, vectors).min(axis=1) >= SAME_DIRECTION**2
+        vectors = np.where(is_common[:, None], vectors, 0.0)
+        np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
+    return eigenspaces(held - held @ eigenspaces(span, 0.5) @ held, 0.5)
 
 
 def _held_directions(projectors: Array) -> Array:

@@ -25,52 +25,17 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csr_array
 
 from fastcontact._tools.records import record, replace
-from fastcontact.arrays import Array, Indices, Mask, largest
-from fastcontact.contact.constraints import Constraints
+from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, Pairing, normals, tangents
-from fastcontact.contact.projection import (
-    FacetPoints,
-    facet_points,
-    nodal_normals,
-    smooth_normals,
-)
+from fastcontact.contact.pairing import Candidates, Pairing, tangents
+from fastcontact.contact.projection import DeformedSide, facet_points
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import nodal_rows, rows_of, scaled, shapes_at
 from fastcontact.round_off import DIFFERENCE_STEP, TINY
-
-
-class NodalNormals:
-    """Nodal normals of a side, which are those of `nodal_normals`, and their variation.
-
-    Parameters
-    ----------
-    side : Surface
-    coordinates : ndarray (n_points, dim)
-        Coordinates of all points, at which the normals are computed [length].
-
-    Attributes
-    ----------
-    normal : ndarray (m, dim)
-        Unit normals at the m nodes of the side [-].
-    """
-
-    def __init__(self, side: Surface, coordinates: Array) -> None:
-        self._side, self._coordinates, self.normal = side, coordinates, nodal_normals(side, coordinates)
-        self._step = DIFFERENCE_STEP * float(np.ptp(coordinates[side.points], axis=0).max()) / np.sqrt(side.n_facets)
-
-    def variation(self, du: Array) -> Array:
-        """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length].
-
-        It is computed by central differences.
-        """
-        rate = (largest(du[self._side.points]) or 1.0) / self._step
-        ahead = nodal_normals(self._side, self._coordinates + 0.5 / rate * du)
-        behind = nodal_normals(self._side, self._coordinates - 0.5 / rate * du)
-        return np.asarray(rate * (ahead - behind))
 
 
 class InterpolatedNormals:
@@ -78,14 +43,13 @@ class InterpolatedNormals:
 
     Parameters
     ----------
-    nodal : NodalNormals
-        Nodal normals of the side.
+    side : DeformedSide
     local : ndarray of int (n, k)
         Nodes of the facet of each point, numbered on the side.
     shape : ndarray (n, k)
         Values of their shape functions at the point [-].
     at_nodes : ndarray (n, k, dim), optional
-        Normals at these nodes, which differ from those of `nodal` at corners [-].
+        Normals at these nodes, which differ from `DeformedSide.nodal_normals` at corners [-].
 
     Attributes
     ----------
@@ -93,18 +57,12 @@ class InterpolatedNormals:
         Unit normals at the points [-].
     """
 
-    def __init__(self, nodal: NodalNormals, local: Indices, shape: Array, at_nodes: Array | None = None) -> None:
-        self._at_nodes = nodal.normal[local] if at_nodes is None else at_nodes
+    def __init__(self, side: DeformedSide, local: Indices, shape: Array, at_nodes: Array | None = None) -> None:
+        self._at_nodes = side.nodal_normals[local] if at_nodes is None else at_nodes
         mean = np.einsum("nk,nkd->nd", shape, self._at_nodes)
         self._length = np.linalg.norm(mean, axis=1, keepdims=True)
-        self.normal, self._nodal = mean / self._length, nodal
-        self._to_points = shapes_at(shape, local, len(nodal.normal))
-
-    @classmethod
-    def of_facets(cls, side: Surface, coordinates: Array, facet: Indices, feet: FacetPoints) -> InterpolatedNormals:
-        """Return the interpolated `smooth_normals` of a side at the points `feet` of its facets `facet` (n,)."""
-        at_nodes = smooth_normals(side, coordinates)[facet]
-        return cls(NodalNormals(side, coordinates), feet.local, feet.shape, at_nodes)
+        self.normal, self._side = mean / self._length, side
+        self._to_points = shapes_at(shape, local, len(side.surface.points))
 
     def gradient(self, shape_gradient: Array) -> Array:
         """Return the derivatives (n, dim - 1, dim) of the normals with respect to the reference coordinates of facets [-].
@@ -115,8 +73,8 @@ class InterpolatedNormals:
         return np.asarray(slope - np.einsum("nid,nd->ni", slope, self.normal)[:, :, None] * self.normal[:, None])
 
     def variation(self, du: Array) -> Array:
-        """See `NodalNormals.variation`."""
-        return transverse(self.normal, self._to_points @ self._nodal.variation(du)) / self._length
+        """Return the variation (n, dim) of the normals [-] for a variation `du` (n_points, dim) of displacements [length]."""
+        return transverse(self.normal, self._to_points @ self._side.variation(du)) / self._length
 
 
 def transverse(normal: Array, vector: Array) -> Array:
@@ -142,8 +100,7 @@ class NodalWeights(NamedTuple):
 
     def product(self, nodal: Array) -> Array:
         """Return the weighted sums (n, dim) of a nodal field (n_points, dim)."""
-        terms = (self.values[:, k, None] * nodal[self.nodes[:, k]] for k in range(self.nodes.shape[1]))
-        return sum(terms, np.zeros((len(self.nodes), nodal.shape[1])))
+        return np.einsum("nk,nkd->nd", self.values, nodal[self.nodes])
 
     def transposed_product(self, forces: Array, n_points: int) -> Array:
         """Return the nodal forces (n_points, dim) of forces (n, dim) at the points."""
@@ -188,9 +145,8 @@ class _SurfacePoints:
         Pairing of the candidates with the primary side.
     rows : ndarray of int (n,)
         Numbers of the points in `candidates`.
-    primary : Surface
-    coordinates : ndarray (n_points, dim)
-        Coordinates of the pairing [length].
+    primary : DeformedSide
+        The primary side in the configuration of the pairing.
     normals : str or tuple of float
         Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
     closest : bool
@@ -215,12 +171,12 @@ class _SurfacePoints:
     """
 
     def __init__(
-        self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface, coordinates: Array,
-        normals: object, closest: bool, slope: Array | None,
+        self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: DeformedSide, normals: object,
+        closest: bool, slope: Array | None,
     ) -> None:  # fmt: skip
-        feet, n_points, facet = pairing.projections(primary, rows), len(coordinates), pairing.facet[rows]
+        feet, coordinates, facet = pairing.projections(primary.surface, rows), primary.coordinates, pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
-        self.motion = shapes_at(shape, nodes, n_points)
+        self.motion = shapes_at(shape, nodes, len(coordinates))
         self._feet, ascending = feet, np.argsort(feet.nodes, axis=1)
         self._facing_nodes = np.take_along_axis(feet.nodes, ascending, axis=1)
         self._weight_gradient = -np.take_along_axis(feet.gradient, ascending[:, :, None], axis=1)
@@ -231,11 +187,11 @@ class _SurfacePoints:
         self._facet_normal: Array | None = None  # None if neither the normals nor the projections depend on it
         if normals == "facet" or closest:
             self._facet_normal = self.normal
-            facet_gradient = self._facet_normal_gradient(primary, coordinates, facet, pairing.xi[rows])
+            facet_gradient = self._facet_normal_gradient(primary, facet, pairing.xi[rows])
         if normals == "facet":
             self._normal_gradient = facet_gradient
         elif isinstance(normals, str):
-            self.averaged = InterpolatedNormals.of_facets(primary, coordinates, facet, feet)
+            self.averaged = InterpolatedNormals(primary, feet.local, feet.shape, primary.smooth_normals[facet])
             self.normal, self._normal_gradient = self.averaged.normal, self.averaged.gradient(feet.gradient)
         else:
             self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
@@ -252,15 +208,17 @@ class _SurfacePoints:
         self._inverse = inverse @ frame
         self._foot_gradient = self.axes if slope is None else self.axes + slope[:, :, None] * self.normal[:, None]
 
-    def _facet_normal_gradient(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array) -> Array:
+    def _facet_normal_gradient(self, primary: DeformedSide, facet: Indices, xi: Array) -> Array:
         """Return the derivatives (n, dim - 1, dim) of facet normals with respect to reference coordinates [-]."""
-        if primary.order == 1 and xi.shape[1] == 1:
+        if primary.surface.order == 1 and xi.shape[1] == 1:
             return np.zeros_like(self.axes)  # straight lines
         # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
         steps = 0.5 * np.eye(xi.shape[1])
-        above, below = ([facet_points(primary, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0))
+        above, below = (
+            [facet_points(primary.surface, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0)
+        )
         second = np.stack(above, axis=3) - np.stack(below, axis=3)
-        curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[self._feet.nodes], self.normal)
+        curvature = np.einsum("nkij,nkd,nd->nij", second, primary.coordinates[self._feet.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
 
     @cached_property
@@ -362,51 +320,42 @@ class _ObstaclePoints:
 Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 
-@record
 class ClosingMotion:
     """Part q m of the relative motion that closes the gap, with ``q = a . o / a . m``; see `Slips`.
 
-    Attributes
+    The unit vector m lies along the difference of the primary and the secondary normal, which is the mean direction of the
+    normals of both sides.
+
+    Parameters
     ----------
-    mean, mean_length : ndarray (n, dim), ndarray (n, 1)
-        Unit vector m along the difference of the primary and the secondary normal, which is the mean direction of the normals
-        of both sides, and the length of this difference [-].
-    secondary : NodalNormals or InterpolatedNormals or None
-        Normals of the secondary side; None if m is the normal of an obstacle.
+    primary : ndarray (n, dim)
+        Primary normals [-].
+    secondary : (ndarray (n, dim), Callable) or None
+        Secondary normals, and the function from a variation of the displacements (n_points, dim) [length] to theirs; None
+        if m is the normal of an obstacle.
     opening : ndarray (n, dim)
         Vector o from the primary to the secondary side at the beginning of the step [length].
-    length : ndarray (n,)
-        Length q; zero where no gap closes [length].
+    length : ndarray (n,), optional
+        Length q, zero where no gap closes, if the direction a is the normal of the constraint [length]. By default, a is m.
+
+    Attributes
+    ----------
+    vector : ndarray (n, dim)
+        The vectors q m [length].
     along_mean : bool
-        Whether the direction a is m; otherwise it is the normal of the constraint.
+        Whether the direction a is m.
     """
 
-    mean: Array
-    mean_length: Array
-    secondary: NodalNormals | InterpolatedNormals | None
-    opening: Array
-    length: Array
-    along_mean: bool
-
-    @classmethod
-    def of(
-        cls, primary: Array, secondary: NodalNormals | InterpolatedNormals | None, opening: Array,
+    def __init__(
+        self, primary: Array, secondary: tuple[Array, Callable[[Array], Array]] | None, opening: Array,
         length: Array | None = None,
-    ) -> ClosingMotion:  # fmt: skip
-        """Return the closing motion between sides with the normals `primary` (n, dim) and `secondary`.
-
-        Without a given `length` (n,), the direction a is m.
-        """
-        mean = primary if secondary is None else primary - secondary.normal
-        mean_length = np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), TINY)
-        mean = mean / mean_length
-        projected = np.einsum("nd,nd->n", mean, opening)
-        return cls(mean, mean_length, secondary, opening, projected if length is None else length, length is None)
-
-    @property
-    def vector(self) -> Array:
-        """The vectors q m (n, dim) [length]."""
-        return self.length[:, None] * self.mean
+    ) -> None:  # fmt: skip
+        self._secondary, self._opening, self.along_mean = secondary, opening, length is None
+        mean = primary if secondary is None else primary - secondary[0]
+        self._mean_length = np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), TINY)
+        self._mean = mean / self._mean_length
+        self._length = np.einsum("nd,nd->n", self._mean, opening) if length is None else length
+        self.vector = self._length[:, None] * self._mean
 
     def variation(self, du: Array, normal: tuple[Array, Array], d_primary: Array, d_opening: Array) -> Array:
         """Return the variation (n, dim) of q m for a variation `du` (n_points, dim) of the displacements [length].
@@ -414,15 +363,15 @@ class ClosingMotion:
         `normal` contains the normals of the constraints and their variation; `d_primary` and `d_opening` are the variations
         of the primary normals and of o, all (n, dim).
         """
-        mean = self.mean
-        d_difference = d_primary if self.secondary is None else d_primary - self.secondary.variation(du)
-        d_mean = transverse(mean, d_difference) / self.mean_length
+        mean, length = self._mean, self._length
+        d_difference = d_primary if self._secondary is None else d_primary - self._secondary[1](du)
+        d_mean = transverse(mean, d_difference) / self._mean_length
         a, d_a = (mean, d_mean) if self.along_mean else normal
         cosine = np.einsum("nd,nd->n", a, mean)
-        numerator = np.einsum("nd,nd->n", d_a, self.opening) + np.einsum("nd,nd->n", a, d_opening)
-        numerator -= self.length * (np.einsum("nd,nd->n", d_a, mean) + np.einsum("nd,nd->n", a, d_mean))
-        d_q = np.divide(numerator, cosine, out=np.zeros_like(cosine), where=(self.length != 0.0) & (cosine != 0.0))
-        return d_q[:, None] * mean + self.length[:, None] * d_mean
+        numerator = np.einsum("nd,nd->n", d_a, self._opening) + np.einsum("nd,nd->n", a, d_opening)
+        numerator -= length * (np.einsum("nd,nd->n", d_a, mean) + np.einsum("nd,nd->n", a, d_mean))
+        d_q = np.divide(numerator, cosine, out=np.zeros_like(cosine), where=(length != 0.0) & (cosine != 0.0))
+        return d_q[:, None] * mean + length[:, None] * d_mean
 
 
 @record
@@ -520,11 +469,6 @@ class Slips:
         total = self.total + substitution.slip(self.closing.vector, motion @ self.motion)
         return replace(self, total=total, substitutions=(*self.substitutions, substitution))
 
-    @property
-    def force(self) -> Array:
-        """Tangential forces as vectors (n, dim) [force]."""
-        return np.einsum("nk,knd->nd", self.forces, self.tangents)
-
     def variation(
         self, du: Array, d_points: Variation, points: Points, weights: csr_array | None,
         normals: tuple[Array, Array, Array],
@@ -554,7 +498,8 @@ class Slips:
             d_slip = d_slip + d_closing if self.symmetric else d_slip
         if self.rotation_gradient is not None:
             d_slip -= _weighted(weights, points.motion @ du @ self.rotation_gradient)
-        d_slip += sum(substitution.slip(d_closing, motion) for substitution in self.substitutions)
+        for substitution in self.substitutions:
+            d_slip = d_slip + substitution.slip(d_closing, motion)
         normal_part = np.einsum("nd,nd->n", normal, self.total)
         T = self.tangents
         return np.einsum("knd,nd->kn", T, d_slip) - np.einsum("knd,nd,n->kn", T, d_normal, normal_part)
@@ -582,8 +527,8 @@ class LinearisedPoints:
         Lagrange multipliers of the constraints [force].
     tests : csr_array (m, n), optional
         Weights of the points in the mean normals, if the normals of the constraints are such means.
-    separate_normals : NodalNormals or Points, optional
-        Nodal normals of the secondary side, or points whose normals are those of the constraints, if the latter are neither
+    separate_normals : DeformedSide or Points, optional
+        The secondary side, or points whose normals are those of the constraints, if the latter are neither
         means over the integration points nor the normals of these points.
     slips : Slips, optional
         Slips of the constraints; None without tangential constraints.
@@ -603,7 +548,7 @@ class LinearisedPoints:
     normal: Array
     multiplier: Array
     tests: csr_array | None = None
-    separate_normals: NodalNormals | Points | None = None
+    separate_normals: DeformedSide | Points | None = None
     slips: Slips | None = None
     rows_in_pair: tuple[Indices, int] | None = None
     slip_normals: tuple[InterpolatedNormals, Array] | None = None
@@ -611,7 +556,7 @@ class LinearisedPoints:
 
     def derivatives_along(self, du: Array) -> tuple[Array, Array]:
         """See `constraints.Linearised`."""
-        d_points = self.points.variation(du)
+        (tangential, force, elastic), d_points = self._solution, self.points.variation(du)
         d_normal = self._normal_variation(du, d_points.normal)
         d_gaps = np.einsum("md,md->m", _weighted(self.functions, self.points.offset), d_normal)[None]
         d_gaps -= np.einsum("md,md->m", self.normal, _weighted(self.functions, d_points.foot))
@@ -623,20 +568,32 @@ class LinearisedPoints:
                 d_averaged = averaged.variation(du) + np.einsum("nid,ni->nd", gradient, d_points.xi)
                 d_primary = _weighted(self.functions, d_averaged)
             normals = self.normal, d_normal, d_primary
-            d_gaps = np.vstack([d_gaps, self.slips.variation(du, d_points, self.points, self.functions, normals)])
-            d_tangential = -np.einsum("md,md->m", self.slips.force, d_normal)[:, None] * self.normal
+            d_slips = self.slips.variation(du, d_points, self.points, self.functions, normals)
+            d_tangential = -np.einsum("md,md->m", tangential, d_normal)[:, None] * self.normal
             if self.compliance is not None:
-                d_gaps += self._elastic_variation(d_normal, d_force + d_tangential)
+                d_elastic, T = self.compliance(d_force + d_tangential), self.slips.tangents
+                d_gaps += np.einsum("md,md->m", d_normal, elastic) + np.einsum("md,md->m", self.normal, d_elastic)
+                normal_part = np.einsum("md,md->m", self.normal, elastic)
+                d_slips += np.einsum("kmd,md->km", T, d_elastic) - np.einsum("kmd,md->km", T, d_normal) * normal_part
+            d_gaps = np.vstack([d_gaps, d_slips])
         if self.rows_in_pair is not None:
             (rows, count), d_paired_gaps = self.rows_in_pair, d_gaps
             d_gaps = np.zeros((len(d_gaps), count))
             d_gaps[:, rows] = d_paired_gaps
-        nodal_forces = self._motion_transposed @ self._at_points(d_force, d_tangential)
-        return nodal_forces + d_points.motion.transposed_product(self._force, len(nodal_forces)), d_gaps
+        nodal_forces = self.points.motion.T @ self._at_points(d_force, d_tangential)
+        return nodal_forces + d_points.motion.transposed_product(force, len(nodal_forces)), d_gaps
 
     @cached_property
-    def _motion_transposed(self) -> csc_array:
-        return self.points.motion.T
+    def _solution(self) -> tuple[Array, Array, Array]:
+        """Tangential forces (m, dim) [force], forces at the points (n, dim) [force], and elastic displacements (m, dim).
+
+        The elastic displacements [length] are zero without `compliance`.
+        """
+        normal, tangential = self.multiplier[:, None] * self.normal, np.zeros_like(self.normal)
+        if self.slips is not None:
+            tangential = np.einsum("nk,knd->nd", self.slips.forces, self.slips.tangents)
+        elastic = np.zeros_like(normal) if self.compliance is None else self.compliance(normal + tangential)
+        return tangential, self._at_points(normal, tangential), elastic
 
     def _at_points(self, normal: Array, tangential: Array) -> Array:
         """Return the forces (n, dim) at the points for normal and tangential forces (m, dim) of the constraints [force]."""
@@ -645,33 +602,6 @@ class LinearisedPoints:
         force = np.asarray(self.functions.T @ (normal + tangential))
         substitutions = () if self.slips is None else self.slips.substitutions
         return sum((s.functions.T @ s.along_axis(tangential) for s in substitutions), force)
-
-    def _elastic_variation(self, d_normal: Array, d_force: Array) -> Array:
-        """Return the variation (1 + k, m) of elastic gaps and slips [length] due to those of normals and forces (m, dim)."""
-        assert self.compliance is not None
-        assert self.slips is not None
-        elastic, d_elastic = self._elastic_displacements, self.compliance(d_force)
-        d_gaps = np.einsum("md,md->m", d_normal, elastic) + np.einsum("md,md->m", self.normal, d_elastic)
-        d_slips = np.einsum("kmd,md->km", self.slips.tangents, d_elastic)
-        d_slips -= np.einsum("kmd,md->km", self.slips.tangents, d_normal) * np.einsum("md,md->m", self.normal, elastic)
-        return np.vstack([d_gaps, d_slips])
-
-    @cached_property
-    def _elastic_displacements(self) -> Array:
-        """Elastic displacements (m, dim) of the constraints [length]."""
-        assert self.compliance is not None
-        return self.compliance(np.add(*self._forces))
-
-    @cached_property
-    def _forces(self) -> tuple[Array, Array]:
-        """Normal and tangential forces (m, dim) of the constraints [force]."""
-        normal = self.multiplier[:, None] * self.normal
-        return normal, np.zeros_like(normal) if self.slips is None else self.slips.force
-
-    @cached_property
-    def _force(self) -> Array:
-        """Forces at the points (n, dim) [force]."""
-        return self._at_points(*self._forces)
 
     @cached_property
     def _length(self) -> Array:
@@ -683,7 +613,7 @@ class LinearisedPoints:
         """Return the variation (m, dim) of the normals of the constraints, given the variation (n, dim) at the points."""
         if self.tests is None:
             return _weighted(self.functions, at_points)
-        if isinstance(self.separate_normals, NodalNormals):
+        if isinstance(self.separate_normals, DeformedSide):
             return -self.separate_normals.variation(du)
         if self.separate_normals is not None:
             return self.separate_normals.variation(du).normal
@@ -697,77 +627,17 @@ class LinearisedPoints:
         return total
 
 
-@record
-class FiniteDifferences:
-    """Contact forces, gaps and slips of one pair, linearised by one-sided finite differences.
-
-    The differences are taken at the mean of the displacements of the pairing and of its solution. The error of a Newton step
-    is then a tenth of that with differences at either of them.
-
-    Attributes
-    ----------
-    constraints : Constraints
-    constraints_after : Callable
-        Function from a motion (n_points, dim) [length] of all points after the pairing of `constraints` to the constraints of
-        a new pairing.
-    forces : (ndarray (m,), ndarray (m, k))
-        Multipliers and tangential forces of the solution with `constraints` [force].
-    motions : (ndarray (n_points, dim), ndarray (n_points, dim), ndarray (n_points, dim))
-        Displacements of the solution, their increments in the load step, and their changes since the pairing [length].
-    points_of_sides : ndarray of int (q,)
-        Points on which the constraints depend.
-    step : float
-        Largest motion of these points in a difference [length].
-    """
-
-    constraints: Constraints
-    constraints_after: Callable[[Array], Constraints]
-    forces: tuple[Array, Array]
-    motions: tuple[Array, Array, Array]
-    points_of_sides: NDArray[np.integer]
-    step: float
-
-    def derivatives_along(self, du: Array) -> tuple[Array, Array]:
-        """See `constraints.Linearised`."""
-        rate = (largest(du[self.points_of_sides]) or 1.0) / self.step
-        d_force, d_gaps = (rate * (y - y0) for y, y0 in zip(self._values(du / rate), self._values_at_mean, strict=True))
-        return d_force.reshape(du.shape), d_gaps
-
-    @cached_property
-    def _values_at_mean(self) -> tuple[Array, Array]:
-        return self._values(np.zeros_like(self.motions[0]))
-
-    def _values(self, motion: Array) -> tuple[Array, Array]:
-        """Return nodal forces (n_dofs,) [force], and gaps and slips (1 + k, m) [length].
-
-        They are those after a `motion` (n_points, dim) from the mean of the displacements [length]. The tangents of
-        `constraints` are rotated from its normals to the new ones by the smallest rotation.
-        """
-        (multiplier, tangential), (displacement, increment, change) = self.forces, self.motions
-        varied = self.constraints_after(0.5 * change + motion)
-        gap = varied.gaps(displacement)[None]
-        if not varied.tangents:
-            return varied.force(multiplier), gap
-        tangents = self.constraints.directions
-        normal0, normal = normals(tangents), normals(varied.directions)
-        scaled_sum = (normal0 + normal) / (1.0 + np.einsum("md,md->m", normal0, normal))[:, None]
-        rotated = [t - np.einsum("md,md->m", t, normal)[:, None] * scaled_sum for t in tangents]
-        rotation = np.einsum("kmd,jmd->mkj", varied.directions, rotated)
-        slip = np.stack([T @ increment.ravel() for T in varied.tangents]) + varied.slip0
-        force = varied.force(multiplier, np.einsum("mkj,mj->mk", rotation, tangential))
-        return force, np.vstack([gap, np.einsum("mkj,km->jm", rotation, slip)])
-
-
 def paired_points(
-    candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
-    normals: object, pose: Pose, closest: bool = False, slope: Array | None = None,
+    candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, points: Array,
+    config: Configuration, normals: object, closest: bool = False, slope: Array | None = None,
 ) -> Points:  # fmt: skip
     """Return the paired candidates with the numbers `rows` (n,), and the variation of their projections.
 
-    The pairing was computed at `coordinates` (n_points, dim) [length]. `pose` applies to obstacles. `normals`, `closest` and
-    `slope` apply to meshed primary sides, see `_SurfacePoints`.
+    The pairing was computed in the configuration `config` of the mesh with the undeformed `points` (n_points, dim) [length].
+    `normals`, `closest` and `slope` apply to meshed primary sides, see `_SurfacePoints`.
     """
     if not isinstance(primary, RigidSide):
-        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest, slope)
-    shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates))
-    return _ObstaclePoints(shapes, primary, coordinates, pose)
+        deformed = config.deformed(primary, points)
+        return _SurfacePoints(candidates, pairing, rows, deformed, normals, closest, slope)
+    shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(points))
+    return _ObstaclePoints(shapes, primary, points + config.displacement, config.pose)

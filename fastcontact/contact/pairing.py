@@ -16,6 +16,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
     Closest,
+    DeformedSide,
     FacetPoints,
     along_line_normals,
     along_normals,
@@ -23,13 +24,11 @@ from fastcontact.contact.projection import (
     distance_from_edges,
     facet_points,
     interpolate,
-    nodal_normals,
-    normals_at_nodes,
     smooth_ends,
-    smooth_normals,
 )
 from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
+from fastcontact.linear.sparse_rows import rows_of
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -148,7 +147,7 @@ class Pairing:
 
 
 def pair(
-    candidates: Array, primary: Surface | RigidSide, coordinates: Array, projection_tolerance: float,
+    candidates: Array, primary: DeformedSide | RigidSide, projection_tolerance: float,
     normals: str | Sequence[float] = "facet", obstacle: Pose | None = None, rounded: bool = False,
 ) -> Pairing:  # fmt: skip
     """Project candidates onto the closest facets of the primary side, or onto a rigid obstacle.
@@ -157,9 +156,7 @@ def pair(
     ----------
     candidates : ndarray (n, dim)
         Positions of the candidates [length].
-    primary : Surface or RigidSide
-    coordinates : ndarray (n_points, dim)
-        Current coordinates of all points of the mesh [length].
+    primary : DeformedSide or RigidSide
     projection_tolerance : float
         Largest overhang beyond the end of the primary surface at which a candidate is paired, in facet lengths [-]
         (TOLE_PROJ_EXT of code_aster). It then faces the straight extension of the facet, so that the forces on both
@@ -187,26 +184,26 @@ def pair(
         _, normal, paired, offset = primary.project(candidates, pose)
         no_facet = np.zeros(len(candidates), np.intp)
         return Pairing(no_facet, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
-    closest = closest_of_types(candidates, primary.node_positions(coordinates))
+    closest = closest_of_types(candidates, primary.surface.node_positions(primary.coordinates))
     if normals == "facet" and not rounded:
-        at_smooth_end = _at_smooth_ends(primary, coordinates, closest)
+        at_smooth_end = _at_smooth_ends(primary, closest)
         paired = closest.overhang <= np.where(at_smooth_end, max(projection_tolerance, OVERHANG), projection_tolerance)
         overhangs = paired & ~at_smooth_end & (closest.overhang > LENGTH_ROUND_OFF)
         pairing = Pairing(closest.facet, closest.xi, closest.normal, paired)
-        return _with_overhang(pairing, candidates, primary, coordinates, overhangs)
-    at_nodes = smooth_normals(primary, coordinates)
+        return _with_overhang(pairing, candidates, primary, overhangs)
+    at_nodes = primary.smooth_normals
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
-    project = along_normals if coordinates.shape[1] == 3 else along_line_normals
-    facet, xi, overhang, normal = project(candidates, primary, coordinates, at_nodes, closest)
+    project = along_normals if candidates.shape[1] == 3 else along_line_normals
+    facet, xi, overhang, normal = project(candidates, primary, at_nodes, closest)
     if normals == "facet":
-        normal = _round_edges(primary, coordinates, facet, xi, normal)
+        normal = _round_edges(primary, facet, xi, normal)
     paired = overhang <= projection_tolerance
     overhangs = paired & (overhang > LENGTH_ROUND_OFF)
-    return _with_overhang(Pairing(facet, xi, normal, paired), candidates, primary, coordinates, overhangs)
+    return _with_overhang(Pairing(facet, xi, normal, paired), candidates, primary, overhangs)
 
 
-def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:
+def _round_edges(primary: DeformedSide, facet: Indices, xi: Array, mean: Array) -> Array:
     """Return normals (n, dim) of facets that vary continuously across edges.
 
     In equilibrium a node may lie on the edge between two facets, with a contact force in a direction between their normals.
@@ -215,9 +212,7 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
 
     Parameters
     ----------
-    primary : Surface
-    coordinates : ndarray (n_points, dim)
-        Current coordinates of all points of the mesh [length].
+    primary : DeformedSide
     facet : ndarray of int (n,)
         Number of the facet of each point.
     xi : ndarray (n, dim - 1)
@@ -226,21 +221,19 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
         Averaged normals at the points, which are the result at edges [-]. Over ROUNDED_FRACTION of the facet, the result
         changes to the normal of the facet.
     """
-    normals = interpolate(normals_at_nodes(primary, coordinates)[facet], facet_points(primary, facet, xi))
-    weight = np.clip(1.0 - distance_from_edges(primary, facet, xi) / ROUNDED_FRACTION, 0.0, 1.0)[:, None]
+    normals = interpolate(primary.facet_normals[facet], facet_points(primary.surface, facet, xi))
+    weight = np.clip(1.0 - distance_from_edges(primary.surface, facet, xi) / ROUNDED_FRACTION, 0.0, 1.0)[:, None]
     normal = weight * mean + (1.0 - weight) * normals
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
-def _with_overhang(
-    pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, overhangs: Mask
-) -> Pairing:
+def _with_overhang(pairing: Pairing, candidates: Array, primary: DeformedSide, overhangs: Mask) -> Pairing:
     """Return the pairing with the overhang, `Pairing.beyond`, of the candidates that the mask `overhangs` (n,) marks."""
     rows = np.flatnonzero(overhangs)
     if not len(rows):
         return pairing
-    feet = facet_points(primary, pairing.facet[rows], pairing.xi[rows])
-    nodes = coordinates[feet.nodes]
+    feet = facet_points(primary.surface, pairing.facet[rows], pairing.xi[rows])
+    nodes = primary.coordinates[feet.nodes]
     offset = candidates[rows] - np.einsum("nk,nkd->nd", feet.shape, nodes)
     basis = np.concatenate([np.einsum("nkj,nkd->ndj", feet.gradient, nodes), pairing.normal[rows][:, :, None]], axis=2)
     beyond = np.zeros_like(pairing.xi)
@@ -248,7 +241,7 @@ def _with_overhang(
     return replace(pairing, beyond=beyond)
 
 
-def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> Mask:
+def _at_smooth_ends(primary: DeformedSide, closest: Closest) -> Mask:
     """Return which candidates (n,) overhang the end of a line facet where an adjacent facet continues it smoothly.
 
     Near a node between two facets, points outside a convex or inside a concave line lie beyond the ends of both facets, but
@@ -257,13 +250,11 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> M
     overhangs = closest.overhang > 0.0
     if closest.position.shape[1] == 3 or not overhangs.any():
         return np.zeros(len(overhangs), bool)
-    smooth = smooth_ends(primary, smooth_normals(primary, coordinates))
+    smooth = smooth_ends(primary.surface, primary.smooth_normals)
     return np.asarray(overhangs & smooth[closest.facet, (closest.xi[:, 0] > 0.0).astype(np.intp)])
 
 
-def gap_rows(
-    candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, reference: Array
-) -> tuple[csr_array, Array]:
+def gap_rows(motion: csr_array, pairing: Pairing, reference: Array) -> tuple[csr_array, Array]:
     """Return G and gap0 of the gaps ``gap0 + G u`` of candidates.
 
     The gap of a candidate is ``n . (x_secondary - x_primary)`` with the normal n, the position x_secondary of the candidate
@@ -272,9 +263,9 @@ def gap_rows(
 
     Parameters
     ----------
-    candidates : Candidates
+    motion : csr_array (n, n_points)
+        The `relative_motion` of the candidates [-].
     pairing : Pairing
-    primary : Surface or RigidSide
     reference : ndarray (n_points, dim)
         Undeformed coordinates of all points [length].
 
@@ -285,7 +276,7 @@ def gap_rows(
     gap0 : ndarray (n,)
         Gaps at u = 0 [length].
     """
-    G = rows_along(pairing.normal, candidates, pairing, primary, reference.size)
+    G = rows_of(motion, pairing.normal)
     gap0 = G @ reference.ravel()
     if pairing.offset is not None:
         gap0 += np.where(pairing.paired, pairing.offset, 0.0)
@@ -334,26 +325,20 @@ def normals(directions: Sequence[Array]) -> Array:
     return np.cross(directions[0], directions[1])
 
 
-def rows_along(
-    direction: Array, candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, n_dofs: int
-) -> csr_array:
-    """Return the derivatives (n, n_dofs) of relative displacements with respect to the displacements of all points [-].
+def relative_motion(candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, n_points: int) -> csr_array:
+    """Return the map (n, n_points) from nodal vectors to the differences between candidates and their projections [-].
 
-    The displacement of each candidate relative to its projection on the primary side is taken along `direction` (n, dim).
     Rows of unpaired candidates are empty.
     """
-    dim = direction.shape[1]
     rows = np.flatnonzero(pairing.paired)
     nodes, weights = candidates.nodes[rows], candidates.shape[rows]
     if not isinstance(primary, RigidSide):
         feet = pairing.projections(primary, rows)
         nodes, weights = np.hstack([nodes, feet.nodes]), np.hstack([weights, -feet.shape])
-    values = weights[:, :, None] * direction[rows][:, None, :]
-    columns = nodes[:, :, None] * dim + np.arange(dim)
-    start = np.concatenate([[0], np.cumsum(pairing.paired) * (nodes.shape[1] * dim)])
-    matrix = csr_array((values.ravel(), columns.ravel(), start), shape=(len(candidates.nodes), n_dofs))
-    matrix.sum_duplicates()
-    return matrix
+    start = np.concatenate([[0], np.cumsum(pairing.paired) * nodes.shape[1]])
+    motion = csr_array((weights.ravel(), nodes.ravel(), start), shape=(len(candidates.nodes), n_points))
+    motion.sum_duplicates()
+    return motion
 
 
 def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSide) -> str | tuple[float, ...]:
@@ -376,7 +361,10 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
         if vector.shape != (dim,) or not (np.isfinite(length) and length > 0):
             raise ContactError(f"normals = {normals!r} must be one of {', '.join(KINDS)}, or a vector of {dim} numbers")
         result = tuple((vector / length).tolist())
-        if isinstance(primary, Surface) and (nodal_normals(primary, points) @ vector).mean() <= FACING * length:
+        if (
+            isinstance(primary, Surface)
+            and (DeformedSide(primary, points).nodal_normals @ vector).mean() <= FACING * length
+        ):
             raise ContactError(
                 f"normals = {normals!r} must point out of the body of '{primary.group}', the primary side: reverse the vector"
             )

@@ -9,6 +9,7 @@ onto facets in 3D, and `along_line_normals` onto lines in 2D.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from scipy.sparse import coo_array, csr_array
 
 from fastcontact._jit.parallel import parallel_map, portions
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.arrays import Array, Indices, Mask, Numbers, largest
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
@@ -24,7 +25,7 @@ from fastcontact.contact.surface import FacetBlock, Surface, by_block, padded
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF
 
 # Adjacent facets whose normals enclose a smaller angle [degrees] approximate a smooth surface; others form a corner. The
 # value differs from the exterior angles of all regular polygons, so that round-off has no influence on their normals.
@@ -103,61 +104,107 @@ def facets_containing(side: Surface, facet: Indices, xi: Array) -> tuple[Indices
     return point, common_facet, coordinates
 
 
-def nodal_normals(side: Surface, coordinates: Array) -> Array:
-    """Return the averaged unit normals (m, dim) of the nodes of a side.
+@record
+class DeformedSide:
+    """A side of a contact pair in one configuration. Its normals are computed when they are first used.
 
-    The normal of a node is the mean of the unit normals of its facets, weighted by their angles at the node. With these
-    weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
+    Attributes
+    ----------
+    surface : Surface
+    coordinates : ndarray (n_points, dim)
+        Coordinates of all points of the mesh [length].
+    corner : float
+        Angle between the normals of two facets beyond which they form a corner [degrees].
     """
-    return _nodal_means(side, normals_at_nodes(side, coordinates), _weights(side, coordinates))
 
+    surface: Surface
+    coordinates: Array
+    corner: float = CORNER
 
-def _nodal_means(side: Surface, normal: Array, weight: Array) -> Array:
-    """Return unit nodal normals (m, dim) of a side, given the results of `normals_at_nodes` and `_weights`."""
-    node, total = side.all_local.ravel(), np.empty((len(side.points), normal.shape[2]))
-    for axis, component in enumerate((weight[..., None] * normal).reshape(-1, normal.shape[2]).T):
-        total[:, axis] = np.bincount(node, component, len(total))
-    side.add_across_ends(total)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)
+    @cached_property
+    def facet_normals(self) -> Array:
+        """Unit normals (n_facets, k, dim) of all facets at the nodes `Surface.all_facets`, zero at repeated nodes."""
+        return padded([facet_normals(block, self.coordinates) for block in self.surface.blocks])
 
+    @cached_property
+    def _weights(self) -> Array:
+        """Weights (n_facets, k) of the normals of facets in averages at nodes.
 
-def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) -> Array:
-    """Return averaged unit normals (n_facets, k, dim) at the nodes of all facets, separately on both sides of corners.
+        They are the interior angles of the facets at corners [radian], 1 at other nodes and on lines, and 0 where
+        `Surface.all_facets` repeats a node.
+        """
+        if self.coordinates.shape[1] == 2:
+            return self.surface.node_weights
+        from fastcontact.contact import projection_kernels
 
-    Except at corners, they are those of `nodal_normals`. At a corner, the mean for a facet includes only those facets that
-    continue it smoothly, so that a punch is flat up to its corner although its flanks belong to the surface. Two facets form
-    a corner if their normals enclose a larger angle than `corner` [degrees]. Nodes are those of `Surface.all_facets`.
-    """
-    node, dim = side.all_local.ravel(), coordinates.shape[1]
-    normals, weights = normals_at_nodes(side, coordinates), _weights(side, coordinates)
-    smooth, normal, weight = _nodal_means(side, normals, weights)[node], normals.reshape(-1, dim), weights.ravel()
-    # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
-    entries = np.flatnonzero(side.node_weights)  # without repeated nodes
-    deviates = np.einsum("pd,pd->p", normal[entries], smooth[entries]) < np.cos(np.radians(0.5 * corner))
-    if not deviates.any():
-        return smooth.reshape(*side.all_local.shape, dim)
-    nodes_at_corners = np.unique(node[entries[deviates]])
-    by_node = entries[np.argsort(node[entries], kind="stable")]
-    start = np.append(0, np.cumsum(np.bincount(node[entries])))
-    for node_at_corner in nodes_at_corners:
-        at_node = by_node[start[node_at_corner] : start[node_at_corner + 1]]
-        is_smooth = normal[at_node] @ normal[at_node].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
-        total = (is_smooth * weight[at_node]) @ normal[at_node]
-        smooth[at_node] = total / np.linalg.norm(total, axis=1, keepdims=True)
-    return smooth.reshape(*side.all_local.shape, dim)
+        weights = []
+        for block in self.surface.blocks:
+            n = elements.get(block.element).n_corners
+            weights.append(np.empty(block.facets.shape))
+            projection_kernels.angles(self.coordinates[block.facets], n, weights[-1])
+        return padded(weights)
 
+    @cached_property
+    def nodal_normals(self) -> Array:
+        """Averaged unit normals (m, dim) of the nodes of the side.
 
-def normals_at_nodes(side: Surface, coordinates: Array) -> Array:
-    """Return the unit normals (n_facets, k, dim) of all facets at the nodes `Surface.all_facets`, zero at repeated nodes."""
-    return padded([facet_normals(block, coordinates) for block in side.blocks])
+        The normal of a node is the mean of the unit normals of its facets, weighted by their angles at the node. With these
+        weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
+        """
+        node, dim = self.surface.all_local.ravel(), self.coordinates.shape[1]
+        total = np.empty((len(self.surface.points), dim))
+        for axis, component in enumerate((self._weights[..., None] * self.facet_normals).reshape(-1, dim).T):
+            total[:, axis] = np.bincount(node, component, len(total))
+        self.surface.add_across_ends(total)
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)
+
+    def variation(self, du: Array) -> Array:
+        """Return the variation (m, dim) of `nodal_normals`, computed by central differences [-].
+
+        `du` (n_points, dim) is the variation of the displacements [length].
+        """
+        nodes, coordinates = self.surface.points, self.coordinates
+        step = DIFFERENCE_STEP * float(np.ptp(coordinates[nodes], axis=0).max()) / np.sqrt(self.surface.n_facets)
+        rate = (largest(du[nodes]) or 1.0) / step
+        ahead = DeformedSide(self.surface, coordinates + 0.5 / rate * du).nodal_normals
+        behind = DeformedSide(self.surface, coordinates - 0.5 / rate * du).nodal_normals
+        return np.asarray(rate * (ahead - behind))
+
+    @cached_property
+    def smooth_normals(self) -> Array:
+        """Averaged unit normals (n_facets, k, dim) at the nodes of all facets, separately on both sides of corners.
+
+        Except at corners, they are those of `nodal_normals`. At a corner, the mean for a facet includes only those facets
+        that continue it smoothly, so that a punch is flat up to its corner although its flanks belong to the surface. Nodes
+        are those of `Surface.all_facets`.
+        """
+        shape, node = self.facet_normals.shape, self.surface.all_local.ravel()
+        smooth, normal, weight = (
+            self.nodal_normals[node],
+            self.facet_normals.reshape(-1, shape[2]),
+            self._weights.ravel(),
+        )
+        # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
+        entries = np.flatnonzero(self.surface.node_weights)  # without repeated nodes
+        deviates = np.einsum("pd,pd->p", normal[entries], smooth[entries]) < np.cos(np.radians(0.5 * self.corner))
+        if not deviates.any():
+            return smooth.reshape(shape)
+        nodes_at_corners = np.unique(node[entries[deviates]])
+        by_node = entries[np.argsort(node[entries], kind="stable")]
+        start = np.append(0, np.cumsum(np.bincount(node[entries])))
+        for node_at_corner in nodes_at_corners:
+            at_node = by_node[start[node_at_corner] : start[node_at_corner + 1]]
+            is_smooth = normal[at_node] @ normal[at_node].T >= np.cos(np.radians(self.corner)) - LENGTH_ROUND_OFF
+            total = (is_smooth * weight[at_node]) @ normal[at_node]
+            smooth[at_node] = total / np.linalg.norm(total, axis=1, keepdims=True)
+        return smooth.reshape(shape)
 
 
 def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     """Return the unit normals (n_facets, n_nodes, dim) of each facet at its nodes, for `coordinates` (n_points, dim)."""
-    element, nodes = elements.get(block.element), coordinates[block.facets]
-    slopes = element.gradient(element.nodes)
-    if element.dim == 2:
+    nodes, slopes = coordinates[block.facets], block.slopes_at_nodes
+    if nodes.shape[2] == 3:
         from fastcontact.contact import projection_kernels
 
         out = np.empty(nodes.shape)
@@ -166,24 +213,6 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     normal = area_vectors(nodes, slopes)
     length = np.linalg.norm(normal, axis=2, keepdims=True)
     return np.divide(normal, length, out=np.zeros_like(normal), where=length != 0.0)  # facets may degenerate to points
-
-
-def _weights(side: Surface, coordinates: Array) -> Array:
-    """Return the weights (n_facets, k) of the normals of facets in averages at nodes.
-
-    They are the interior angles of the facets at corners [radian], 1 at other nodes and on lines, and 0 where
-    `Surface.all_facets` repeats a node.
-    """
-    if coordinates.shape[1] == 2:
-        return side.node_weights
-    from fastcontact.contact import projection_kernels
-
-    weights = []
-    for block in side.blocks:
-        n = elements.get(block.element).n_corners
-        weights.append(np.empty(block.facets.shape))
-        projection_kernels.angles(coordinates[block.facets], n, weights[-1])
-    return padded(weights)
 
 
 def interpolate(normals: Array, points: FacetPoints) -> Array:
@@ -289,7 +318,7 @@ def _raise_failure(points: Array, facet: Indices, nodes: Array) -> None:
 
 
 def along_normals(
-    points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
+    points: Array, side: DeformedSide, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
     """Project points onto a surface in 3D along its interpolated normals, starting from their closest points.
 
@@ -297,11 +326,9 @@ def along_normals(
     ----------
     points : ndarray (n, 3)
         Positions of the points [length].
-    side : Surface
-    coordinates : ndarray (n_points, 3)
-        Coordinates of all nodes [length].
+    side : DeformedSide
     normals : ndarray (n_facets, k, 3)
-        Unit normals at the nodes of the facets of all blocks, see `smooth_normals`.
+        Unit normals at the nodes of all facets, see `DeformedSide.smooth_normals`.
     start : Closest
         Closest points, from which the iteration starts, and which are the result if it fails.
 
@@ -320,15 +347,15 @@ def along_normals(
 
     projection = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
     # Coordinates are relative to the centre of the surface. Far from the origin, their round-off would exceed the tolerance.
-    x = coordinates[side.points]
+    surface, coordinates = side.surface, side.coordinates
+    x = coordinates[surface.points]
     centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
-    relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in side.blocks]
-    normals_and_nodes = zip(np.split(normals, side.offsets[1:-1]), nodes_of_blocks, strict=True)
+    relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in surface.blocks]
+    normals_and_nodes = zip(np.split(normals, surface.offsets[1:-1]), nodes_of_blocks, strict=True)
     normals_of_blocks = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in normals_and_nodes]
     terms, directions = _polynomials(nodes_of_blocks), _polynomials(normals_of_blocks)
-    surface = terms, directions, side.triangular, side.neighbours
-    arguments = relative_points, heights, *surface, projection
+    arguments = relative_points, heights, terms, directions, surface.triangular, surface.neighbours, projection
     parallel_map(lambda span: projection_kernels.along_normals(*span, *arguments), portions(len(points)))
     return projection
 
@@ -348,29 +375,30 @@ def _polynomials(blocks: Sequence[Array]) -> Array:
 
 
 def along_line_normals(
-    points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
+    points: Array, side: DeformedSide, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
     """Project points (n, 2) onto a line along its interpolated normals.
 
     The other parameters and the results are those of `along_normals`, in 2D.
     """
-    nodes, at_nodes = coordinates[side.all_facets], normals
-    if len(side.blocks) > 1:  # if some lines are curved, straight lines get a third node in the middle
-        curved = side.node_weights[:, :, None] > 0.0
+    surface, at_nodes = side.surface, normals
+    nodes = side.coordinates[surface.all_facets]
+    if len(surface.blocks) > 1:  # if some lines are curved, straight lines get a third node in the middle
+        curved = surface.node_weights[:, :, None] > 0.0
         nodes, at_nodes = (np.where(curved, x, x[:, :2].mean(axis=1, keepdims=True)) for x in (nodes, at_nodes))
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
-    neighbour = np.where(smooth_ends(side, normals), side.line_neighbours, -1)
+    neighbour = np.where(smooth_ends(surface, normals), surface.line_neighbours, -1)
     arguments = map(np.ascontiguousarray, (points, nodes, at_nodes))
     search_2d_kernels.along_normals(*arguments, neighbour, facet, xi, overhang)
     xi = xi[:, None]
-    return facet, xi, overhang, interpolate(normals[facet], facet_points(side, facet, xi))
+    return facet, xi, overhang, interpolate(normals[facet], facet_points(surface, facet, xi))
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:
     """Return the ends (n_facets, 2) of line facets at which an adjacent facet continues the line without a corner.
 
-    `normals` (n_facets, k, 2) are the normals at the nodes of the facets, see `smooth_normals`. At such an end they are
-    equal for both facets.
+    `normals` (n_facets, k, 2) are the normals at the nodes of the facets, see `DeformedSide.smooth_normals`. At such an
+    end they are equal for both facets.
     """
     total = np.zeros((len(side.points), 2))
     np.add.at(total, side.ends, normals[:, :2])

@@ -6,7 +6,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -68,7 +68,7 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
 
 def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
     """Raise ContactError if a side of contact `name` has no normal at one of its nodes."""
-    undefined = np.flatnonzero(~nodal_normals(side, mesh.points).any(axis=1))
+    undefined = np.flatnonzero(~DeformedSide(side, mesh.points).nodal_normals.any(axis=1))
     if len(undefined):
         point = side.points[undefined[0]]
         raise ContactError(

@@ -40,6 +40,12 @@ class FacetBlock:
         """Line facets (n_facets, 2) of the block before and after each of its line facets; -1 if there is none."""
         return _line_neighbours(self.local)
 
+    @cached_property
+    def slopes_at_nodes(self) -> Array:
+        """Derivatives (n_nodes, n_nodes, dim - 1) of the shape functions (second index) at the nodes (first index) [-]."""
+        element = elements.get(self.element)
+        return element.gradient(element.nodes)
+
     def diameters(self, coordinates: Array) -> Array:
         """Return the largest distance (n_facets,) between two nodes of each facet [length].
 

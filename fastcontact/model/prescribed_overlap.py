@@ -16,8 +16,9 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import Pose
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
-from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
+from fastcontact.contact.pairing import Candidates, gap_rows, relative_motion
 from fastcontact.errors import ModelError
+from fastcontact.linear.sparse_rows import rows_of
 from fastcontact.model.contact_pair import ContactPair, angle_at
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -155,7 +156,8 @@ def _gaps(
 ) -> tuple[Array, csr_array, Mask]:
     """Return the gaps (m,) of nodes [length], their rows (m, n_dofs), and the mask (m,) of paired nodes."""
     pairing = formulation.pair_candidates(candidates, configuration)
-    rows, gap = gap_rows(candidates, pairing, formulation.primary, formulation.points)
+    motion = relative_motion(candidates, pairing, formulation.primary, len(formulation.points))
+    rows, gap = gap_rows(motion, pairing, formulation.points)
     gap = gap + rows @ configuration.displacement.ravel()
     if with_clearance:
         gap = gap + formulation.added_gap(candidates, pairing, configuration)
@@ -165,10 +167,10 @@ def _gaps(
 def _jumps(formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask) -> tuple[Array, Mask]:
     """Return the displacement jumps (m,) at tied nodes due to supports [length], and the mask (m,) of paired nodes."""
     pairing = formulation.pair_candidates(candidates, Configuration.undeformed(formulation.points))
+    motion = relative_motion(candidates, pairing, formulation.primary, len(formulation.points))
     square = np.zeros(len(pairing.paired))
     for axis in np.eye(fixed.shape[1]):
-        direction = np.broadcast_to(axis, pairing.normal.shape)
-        rows = rows_along(direction, candidates, pairing, formulation.primary, fixed.size)
+        rows = rows_of(motion, np.broadcast_to(axis, pairing.normal.shape))
         square += np.where(_determined_by_supports(rows, fixed), rows @ displacement.ravel(), 0.0) ** 2
     return np.sqrt(square), pairing.paired
 

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact._tools.argument_types import finite_vector
 from fastcontact._tools.neighbours import nearest, pairs_within
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.elasticity.loads import facets_of, outward
 from fastcontact.errors import ModelError
@@ -34,7 +34,7 @@ def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
     position = np.full(mesh.n_points, -1, np.intp)
     position[points] = np.arange(len(points))
     blocks = tuple(FacetBlock(name, block, position[block]) for name, block in facets.items())
-    normal = nodal_normals(Surface(group, blocks, points, np.zeros(len(points))), mesh.points)
+    normal = DeformedSide(Surface(group, blocks, points, np.zeros(len(points))), mesh.points).nodal_normals
     normal[np.abs(normal) < ROUND_OFF] = 0.0
     return points.astype(np.intp), normal / np.linalg.norm(normal, axis=1, keepdims=True)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.projection import CORNER, nodal_normals
+from fastcontact.contact.projection import CORNER, DeformedSide
 from fastcontact.contact.side_checks import nodes_of_shared_facets
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
@@ -105,5 +105,7 @@ def _common_smooth_nodes(points: Array, first: Surface, second: Surface) -> Numb
     nodes, *rows = np.intersect1d(first.points, second.points, return_indices=True)
     if not len(nodes):
         return nodes
-    normals = [nodal_normals(side, points)[index] for side, index in zip((first, second), rows, strict=True)]
+    normals = [
+        DeformedSide(side, points).nodal_normals[index] for side, index in zip((first, second), rows, strict=True)
+    ]
     return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > np.cos(np.radians(CORNER))])

@@ -377,8 +377,9 @@ def test_contact_stiffness_in_space_is_minus_the_second_difference_of_gaps(eleme
     du, force = 1e-4 * rng.normal(size=mesh.points.shape), 1.0 + rng.random(len(rows))
 
     def faced_at(u):
-        pairing = pair.pair_candidates(candidates, replace(config, displacement=u))
-        return paired_points(candidates, pairing, rows, pair.primary, mesh.points + u, "facet", config.pose)
+        moved = replace(config, displacement=u)
+        pairing = pair.pair_candidates(candidates, moved)
+        return paired_points(candidates, pairing, rows, pair.primary, mesh.points, moved, "facet")
 
     points = [faced_at(factor * du) for factor in (-1.0, 0.0, 1.0)]
     before, at_rest, after = (force @ np.einsum("nd,nd->n", p.offset, p.normal) for p in points)

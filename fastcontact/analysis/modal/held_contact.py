@@ -202,5 +202,5 @@ def _pair_stiffness(pair: Formulation, step: StepResult, name: str, finite: bool
     pairing = pair.pair_candidates(candidates, configuration)
     rows = np.flatnonzero(pairing.paired & (force != 0.0))
     normals = "facet" if pair.normals == "secondary" else pair.normals
-    points = paired_points(candidates, pairing, rows, pair.primary, deformed, normals, configuration.pose)
+    points = paired_points(candidates, pairing, rows, pair.primary, pair.points, configuration, normals)
     return points.stiffness(force[rows])

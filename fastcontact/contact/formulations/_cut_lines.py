@@ -13,7 +13,7 @@ from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
 from fastcontact.contact.pairing import FACING, Candidates, pair
-from fastcontact.contact.projection import CORNER, closest, nodal_normals, normals_at_nodes
+from fastcontact.contact.projection import CORNER, DeformedSide, closest
 from fastcontact.contact.surface import FacetBlock, Surface, by_block
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.mesh import elements, quadrature
@@ -33,19 +33,26 @@ class LinePoints(OverlapPoints):
 
 
 def line_points(
-    block: FacetBlock, primary: Surface, reference: Array, deformed: Array, axisymmetric: bool, n_gauss: int,
-    tolerance: float, borders: tuple[Indices, Array] = NO_BORDERS,
+    block: FacetBlock, primary: DeformedSide, reference: Array, axisymmetric: bool, n_gauss: int, tolerance: float,
+    borders: tuple[Indices, Array] = NO_BORDERS,
 ) -> LinePoints:  # fmt: skip
-    """Cut the facets of a block in the deformed configuration, and place Gauss points in every segment.
+    """Cut the facets of a block in the configuration of `primary`, and place Gauss points in every segment.
 
     The primary side is extended by `tolerance` facet lengths at its ends. `borders` are additional cuts, given by their
     facets (n,) and reference coordinates (n,).
     """
-    facet, begin, end = _segments(block, primary, deformed, tolerance, borders)
+    cuts = _opposite_nodes(block, primary), borders, _opposite_ends(block, primary, tolerance)
+    ends = np.repeat([-1.0, 1.0], len(block.facets))
+    facet = np.concatenate([np.tile(np.arange(len(block.facets)), 2), *(facets for facets, _ in cuts)])
+    xi = np.concatenate([ends, *(coordinates for _, coordinates in cuts)])
+    order = np.lexsort((xi, facet))
+    facet, xi = facet[order], xi[order]
+    is_segment = (facet[1:] == facet[:-1]) & (np.diff(xi) > LENGTH_ROUND_OFF)
+    begin, end = xi[:-1][is_segment], xi[1:][is_segment]
     s, w = quadrature.gauss_line(n_gauss)
     xi = (0.5 * (begin + end)[:, None] + 0.5 * (end - begin)[:, None] * s[:, 0]).ravel()
     weight = (0.5 * (end - begin)[:, None] * w).ravel()
-    facet = np.repeat(facet, len(w))
+    facet = np.repeat(facet[:-1][is_segment], len(w))
     element = elements.get(block.element)
     nodes, shape = reference[block.facets[facet]], element.shape(xi[:, None])
     tangent = np.einsum("nk,nkd->nd", element.gradient(xi[:, None])[:, :, 0], nodes)
@@ -55,22 +62,6 @@ def line_points(
     return LinePoints(facet, shape, area, xi)
 
 
-def _segments(
-    block: FacetBlock, primary: Surface, deformed: Array, tolerance: float, borders: tuple[Indices, Array]
-) -> tuple[Indices, Array, Array]:
-    """Return the facet of each segment of a block, and the reference coordinates of the two ends of the segment."""
-    n = len(block.facets)
-    normals = nodal_normals(primary, deformed)
-    facet_of_node, xi_of_node = _opposite_nodes(block, primary, deformed, normals)
-    facet_of_end, xi_of_end = _opposite_ends(block, primary, deformed, normals, tolerance)
-    facet = np.concatenate([np.arange(n), np.arange(n), facet_of_node, borders[0], facet_of_end])
-    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), xi_of_node, borders[1], xi_of_end])
-    order = np.lexsort((xi, facet))
-    facet, xi = facet[order], xi[order]
-    is_segment = (facet[1:] == facet[:-1]) & (np.diff(xi) > LENGTH_ROUND_OFF)
-    return facet[:-1][is_segment], xi[:-1][is_segment], xi[1:][is_segment]
-
-
 def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Array:
     """Return the unit normals (n, 2) of a block at integration points, for nodal `coordinates` (n_points, 2)."""
     gradient = elements.get(block.element).gradient(points.xi[:, None])[:, :, 0]
@@ -78,7 +69,7 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
 
 
-def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normals: Array) -> tuple[Indices, Array]:
+def _opposite_nodes(block: FacetBlock, deformed_primary: DeformedSide) -> tuple[Indices, Array]:
     """Return the points of a block opposite the ends of primary facets, as facets and reference coordinates.
 
     Where two primary facets meet, the opposite point lies on the bisector of the angle between them, at which the closest
@@ -86,13 +77,14 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     side, near which points do not face the flank. It is unsuitable elsewhere: at a concave corner with a gap or an
     interference, the closest point jumps from one facet to the next as the bodies move.
     """
+    primary, deformed, normals = deformed_primary.surface, deformed_primary.coordinates, deformed_primary.nodal_normals
     ends, first = np.unique(primary.ends, return_index=True)
     position, normal = deformed[primary.points[ends]], normals[ends]
     opposite = closest(position, deformed[block.facets])
     xi_0 = opposite.xi[:, 0]
     has_two_facets = primary.inner_ends.ravel()[first]
     cosine = np.ones(len(primary.points))  # between the normals of facets and of nodes, small at corners
-    deviation = np.einsum("fad,fad->fa", normals_at_nodes(primary, deformed), normals[primary.all_local])
+    deviation = np.einsum("fad,fad->fa", deformed_primary.facet_normals, normals[primary.all_local])
     np.minimum.at(cosine, primary.all_local, np.where(primary.node_weights > 0.0, deviation, 1.0))
     smooth = has_two_facets & ~(cosine < np.cos(np.radians(0.5 * CORNER)))[ends]
     in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < LARGEST_CUT) & ~smooth)
@@ -110,21 +102,20 @@ def _signed_distances(points: Array, origin: Array, normal: Array) -> Array:
     return np.asarray(offset[..., 0] * normal[..., None, 1] - offset[..., 1] * normal[..., None, 0])
 
 
-def _opposite_ends(
-    block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
-) -> tuple[Indices, Array]:
+def _opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> tuple[Indices, Array]:
     """Return the points of a block on the normals at the ends of the primary side, as facets and reference coordinates."""
+    side, deformed = primary.surface, primary.coordinates
     # A tolerance of the order of round-off does not extend the side, because the cut would leave a sliver of this width.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
     facets, coordinates = [], []
-    for primary_block, offset in zip(primary.blocks, primary.offsets):
+    for primary_block, offset in zip(side.blocks, side.offsets):
         shape = elements.get(primary_block.element).shape
-        inner_ends = primary.inner_ends[offset : offset + len(primary_block.facets)]
+        inner_ends = side.inner_ends[offset : offset + len(primary_block.facets)]
         for end, s in zip(np.repeat([0, 1], len(ends)), np.outer([-1.0, 1.0], ends).ravel(), strict=True):
             free = np.flatnonzero(~inner_ends[:, end])
             weights = shape(np.array([[s]]))[0]
             position = np.einsum("k,fkd->fd", weights, deformed[primary_block.facets[free]])
-            normal = np.einsum("k,fkd->fd", weights, normals[primary_block.local[free]])
+            normal = np.einsum("k,fkd->fd", weights, primary.nodal_normals[primary_block.local[free]])
             distance = _signed_distances(deformed[block.facets][None], position[:, None], normal[:, None])
             facet, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
             facets.append(facet % len(block.facets))
@@ -134,9 +125,9 @@ def _opposite_ends(
     return facet[is_inside], xi[is_inside]
 
 
-def facets_at_ends(block: FacetBlock, primary: Surface, deformed: Array, tolerance: float) -> Indices:
+def facets_at_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> Indices:
     """Return the facets of a block inside which the primary side, or the side of one of several bodies, ends."""
-    return _opposite_ends(block, primary, deformed, nodal_normals(primary, deformed), tolerance)[0]
+    return _opposite_ends(block, primary, tolerance)[0]
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:
@@ -158,7 +149,7 @@ def _zeros(values: Array) -> tuple[Indices, Array]:
 
 
 def line_overlap(
-    secondary: Surface, primary: Surface, reference: Array, deformed: Array, axisymmetric: bool, tolerance: float,
+    secondary: Surface, primary: DeformedSide, reference: Array, axisymmetric: bool, tolerance: float,
     smoothing: Smoothing | None,
 ) -> Overlap:  # fmt: skip
     """Cut the secondary facets in the deformed configuration, and integrate over the segments.
@@ -167,9 +158,10 @@ def line_overlap(
 
     Parameters
     ----------
-    secondary, primary : Surface
-    reference, deformed : ndarray (n_points, 2)
-        Coordinates of all points [length].
+    secondary : Surface
+    primary : DeformedSide
+    reference : ndarray (n_points, 2)
+        Undeformed coordinates of all points [length].
     axisymmetric : bool
         Whether integrals run over the full circle.
     tolerance : float
@@ -177,12 +169,13 @@ def line_overlap(
     smoothing : Smoothing or None
         The smooth surfaces that the facets approximate; None if gaps are measured between the facets.
     """
+    deformed, primary_side = primary.coordinates, primary.surface
     masses, couplings, gap_reductions, overlap_points = [], [], [], []
     for block, offset in zip(secondary.blocks, secondary.offsets):
         n, k = block.facets.shape
-        points = line_points(block, primary, reference, deformed, axisymmetric, k + 2, tolerance)
+        points = line_points(block, primary, reference, axisymmetric, k + 2, tolerance)
         candidates = Candidates(block.facets[points.facet], points.shape)
-        pairing = pair(candidates.positions(deformed), primary, deformed, tolerance)
+        pairing = pair(candidates.positions(deformed), primary, tolerance)
         # Near a corner, the closest facet may be on a flank that does not face the point.
         is_opposed = np.einsum("nd,nd->n", normals_at(block, deformed, points), pairing.normal) < -FACING
         # Either all points of a segment face the other side or none, because too few points would not determine a field.
@@ -200,8 +193,8 @@ def line_overlap(
             np.add.at(gap_reduction, points.facet, points.shape[:, :, None] * vectors)
         gap_reductions.append(gap_reduction)
         covered = np.flatnonzero(area > 0)
-        rows_of_blocks = by_block(pairing.facet[covered], primary.sizes)
-        for primary_block, (positions, primary_facet) in zip(primary.blocks, rows_of_blocks, strict=True):
+        rows_of_blocks = by_block(pairing.facet[covered], primary_side.sizes)
+        for primary_block, (positions, primary_facet) in zip(primary_side.blocks, rows_of_blocks, strict=True):
             rows = covered[positions]
             shape = elements.get(primary_block.element).shape(pairing.xi[rows])
             products = area[rows, None, None] * points.shape[rows, :, None] * shape[:, None, :]

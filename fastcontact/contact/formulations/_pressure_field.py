@@ -42,6 +42,7 @@ from fastcontact.contact.integration import nodes_with_area
 from fastcontact.contact.linearised_geometry import LinearisedPoints
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
+from fastcontact.contact.supported_nodes import directions_without_slip, nodes_with_prescribed_gap
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.linear.sparse_rows import shapes_at
@@ -223,13 +224,9 @@ class PressureFieldFormulation(Formulation):
         """
         return self.points.shape[1] == 3 and not self.friction
 
-    @property
-    def linearised_at_mean(self) -> bool:
-        """See `Formulation`; the error of a Newton step is a tenth of that at the displacements of the pairing."""
-        return isinstance(self.primary, Surface)
-
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.linearised_at_mean = isinstance(self.primary, Surface)  # the error of a Newton step is then a tenth
         if not self.augmentation > 0:
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
 
@@ -239,7 +236,7 @@ class PressureFieldFormulation(Formulation):
         They are excluded nodes, and nodes with a prescribed gap. However, values on facets at whose nodes all gaps are
         prescribed remain independent.
         """
-        prescribed, excluded = self.nodes_with_prescribed_gap(config), self.excluded[self.secondary.points]
+        prescribed, excluded = nodes_with_prescribed_gap(self, config), self.excluded[self.secondary.points]
         on_prescribed_facets = np.zeros_like(prescribed)
         for block in self.secondary.blocks:
             on_prescribed_facets[block.local[prescribed[block.local].all(axis=1)]] = True
@@ -302,7 +299,7 @@ class PressureFieldFormulation(Formulation):
         `Constraints.low_rank_compliance`, or an empty array if no such node exists.
         """
         factors = []
-        for direction, nodes in self.directions_without_slip(config):
+        for direction, nodes in directions_without_slip(self, config):
             columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
                 Z = field.projection.compliance_factor(columns)

@@ -31,22 +31,16 @@ from fastcontact.contact.constraints import Constraints, Linearised, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import facets_at_ends, line_overlap
 from fastcontact.contact.formulations._dual_basis import SMALL_FRACTION, SMALL_INTEGRAL, dual_functions, positive_basis
+from fastcontact.contact.formulations._finite_differences import FiniteDifferences
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NEGLIGIBLE_AREA, areas_of_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import (
-    ClosingMotion,
-    FiniteDifferences,
-    LinearisedPoints,
-    NodalNormals,
-    Points,
-    Substitution,
-    paired_points,
-)
-from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
+from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, Points, Substitution, paired_points
+from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import FACING, Candidates, Normals, pair, tangents
-from fastcontact.contact.projection import nodal_normals, normals_at_nodes, smooth_normals
+from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.search.limits import LARGEST_OVERHANG
+from fastcontact.contact.supported_nodes import directions_without_slip, nodes_with_prescribed_gap
 from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
@@ -171,13 +165,16 @@ class WeightedMortar(Formulation):
         """See `Formulation`; standard multipliers couple the corners of quadratic facets through the mid-side nodes."""
         return self.multipliers == "dual" or self.secondary.order == 1
 
-    def _overlap(self, deformed: Array, pose: Pose) -> Overlap:
+    def _overlap(self, config: Configuration) -> Overlap:
+        deformed = self.points + config.displacement
         if isinstance(self.primary, RigidSide):
-            return obstacle_overlap(self.secondary, self.primary, (self.points, deformed), self.axisymmetric, pose)
+            return obstacle_overlap(
+                self.secondary, self.primary, (self.points, deformed), self.axisymmetric, config.pose
+            )
         if deformed.shape[1] == 3:
             return face_overlap(self.secondary, self.primary, self.points, deformed, self.smoothing)
         options = self.axisymmetric, self.projection_tolerance, self.smoothing
-        return line_overlap(self.secondary, self.primary, self.points, deformed, *options)
+        return line_overlap(self.secondary, config.deformed(self.primary, self.points), self.points, *options)
 
     def may_alternate(self, constraints: Constraints) -> bool:
         """See `Formulation`; a node with dual functions and a small overlap may have a gap in every other pairing."""
@@ -189,9 +186,9 @@ class WeightedMortar(Formulation):
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
-        means = self._means(self.points + config.displacement, config)
+        means = self._means(config)
         # Tied pairs have separate equations for the directions in which both sides are held.
-        held = self.directions_without_slip(config) if self.has_tangents and self.options.kind != "tied" else []
+        held = directions_without_slip(self, config) if self.has_tangents and self.options.kind != "tied" else []
         constraints, slip_data = self._weighted_gaps(config, means, held)
         return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
 
@@ -237,16 +234,16 @@ class WeightedMortar(Formulation):
         constraints = replace(constraints, tangents=slips, directions=directions, friction=mu, slip0=slip0)
         return constraints, SlipData(np.stack(slip_axes), length, substitutions)
 
-    def _means(self, deformed: Array, config: Configuration, earlier: Coverage | None = None) -> Means:
-        """Return the weighted means at the coordinates `deformed` (n_points, dim) [length].
+    def _means(self, config: Configuration, earlier: Coverage | None = None) -> Means:
+        """Return the weighted means in a configuration.
 
         If an `earlier` coverage is given, its nodes have gaps. By default, these nodes result from the overlap.
         """
-        overlap = self._overlap(deformed, config.pose)
+        overlap = self._overlap(config)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         if earlier is None:
             with_gap = self._nodes_with_gaps(weights, SMALL_INTEGRAL if config.rounded else SMALL_FRACTION)
-            nodal_map = self._nodal_map(with_gap, self.nodes_with_prescribed_gap(config))
+            nodal_map = self._nodal_map(with_gap, nodes_with_prescribed_gap(self, config))
             coverage = self._coverage(overlap, weights, with_gap, nodal_map)
         else:
             coverage = self._coverage(overlap, weights, earlier.with_gap, earlier.nodal_map)
@@ -255,7 +252,7 @@ class WeightedMortar(Formulation):
         sums = np.where(self.excluded[self.secondary.points], 0.0, np.asarray(D.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         motion = scaled(csr_array(D - M), 1.0 / weight)
-        normal = self._mean_normals(overlap, deformed, config.pose)
+        normal = self._mean_normals(overlap, config)
         return Means(coverage, D, M, weight, motion, gap_reduction / weight[:, None], normal)
 
     def _linearised(
@@ -270,14 +267,13 @@ class WeightedMortar(Formulation):
 
             def constraints_after(motion: Array) -> Constraints:
                 moved = replace(config, displacement=config.displacement + motion)
-                after = self._means(self.points + moved.displacement, config, means.coverage)
-                return self._weighted_gaps(moved, after, held)[0]
+                return self._weighted_gaps(moved, self._means(moved, means.coverage), held)[0]
 
             sides = np.concatenate([self.secondary.points, self.primary.points])
             motions = displacement, displacement - config.start, displacement - config.displacement
             step = DIFFERENCE_STEP**1.5 * float(np.ptp(self.points[sides], axis=0).max())
             return FiniteDifferences(constraints, constraints_after, (multiplier, tangential), motions, sides, step)
-        config, deformed = replace(config, displacement=displacement), self.points + displacement
+        config = replace(config, displacement=displacement)
         coverages = [] if slip_data is None else [coverage for _, coverage in slip_data.substitutions]
         linearised, functions = self._linearised_points_of_overlap(config, means, multiplier, coverages)
         if slip_data is None:
@@ -287,8 +283,9 @@ class WeightedMortar(Formulation):
         symmetric = self.slip == "symmetric" and not is_rigid
         if symmetric or coverages:
             opening = means.motion @ slips.start - means.gap_reduction
-            secondary = None if is_rigid else NodalNormals(self.secondary, deformed)
-            closing = ClosingMotion.of(means.normal, secondary, opening, slip_data.length)
+            side = config.deformed(self.secondary, self.points)
+            secondary = None if is_rigid else (side.nodal_normals, side.variation)
+            closing = ClosingMotion(means.normal, secondary, opening, slip_data.length)
             slips = replace(slips, total=slips.total + symmetric * closing.vector, closing=closing, symmetric=symmetric)
             for (substitution, _), weights in zip(slip_data.substitutions, functions, strict=True):
                 slips = slips.with_substitution(replace(substitution, functions=weights), linearised.points.motion)
@@ -302,8 +299,8 @@ class WeightedMortar(Formulation):
         """
         if isinstance(self.primary, RigidSide) or self.points.shape[1] == 3:
             return isinstance(self.primary, Surface)
-        deformed, tolerance = self.points + config.displacement, self.projection_tolerance or 0.0
-        ends = ((b.local, facets_at_ends(b, self.primary, deformed, tolerance)) for b in self.secondary.blocks)
+        primary, tolerance = config.deformed(self.primary, self.points), self.projection_tolerance or 0.0
+        ends = ((block.local, facets_at_ends(block, primary, tolerance)) for block in self.secondary.blocks)
         return any(multiplier[local[facets]].any() for local, facets in ends)
 
     def _linearised_points_of_overlap(
@@ -334,21 +331,22 @@ class WeightedMortar(Formulation):
             facets.append(self.secondary.offsets[number] + facet)
             n_points += len(facet)
         candidates = Candidates(padded(nodes), padded(shapes), np.concatenate(facets))
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, LARGEST_OVERHANG, "facet", config.pose)
+        primary = self.primary if isinstance(self.primary, RigidSide) else config.deformed(self.primary, self.points)
+        pairing = pair(candidates.positions(deformed), primary, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
         slope = self.smoothing_slope(candidates, pairing, rows, deformed)
-        points = paired_points(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, slope)
+        options = self.primary, self.points, config
+        points = paired_points(candidates, pairing, rows, *options, normals, True, slope)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
         weights, *substitute_weights = (scaled(matrix, 1.0 / means.weight) for matrix in integrals)
         mean = csr_array(assembled(tests, size)[:, rows])
-        separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
+        separate_normals: DeformedSide | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
             all_nodes = np.arange(len(self.secondary.points))
-            arguments = self.primary, deformed, self.normals, config.pose
-            separate_normals = paired_points(self.node_candidates, pairing, all_nodes, *arguments)
+            separate_normals = paired_points(self.node_candidates, pairing, all_nodes, *options, self.normals)
         elif self.normals == "secondary":
-            separate_normals = NodalNormals(self.secondary, deformed)
+            separate_normals = config.deformed(self.secondary, self.points)
         linearised = points, weights, means.normal, multiplier, mean, separate_normals
         differences = [csr_array(substitute - weights) for substitute in substitute_weights]
         return LinearisedPoints(self.secondary, *linearised), differences
@@ -379,7 +377,7 @@ class WeightedMortar(Formulation):
         """
         direction = normal
         if not isinstance(self.primary, RigidSide):
-            direction = normal - nodal_normals(self.secondary, self.points + config.displacement)
+            direction = normal - config.deformed(self.secondary, self.points).nodal_normals
             direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
         cosine = np.einsum("nd,nd->n", normal, direction)
         gap = np.where(constraints.usable & (cosine > 0.0), constraints.gaps(config.start), 0.0)
@@ -393,7 +391,7 @@ class WeightedMortar(Formulation):
         Usually the rows are those of the mean relative motion. If both sides are held at a node in a direction, as in a
         plane of symmetry, the mean in this direction would contain only the motion of the other side near the plane. The
         functions of neighbouring nodes then replace that of the node. `without_slip` are the directions and nodes
-        `Formulation.directions_without_slip`. The coverage with these functions follows each `Substitution`.
+        `directions_without_slip`. The coverage with these functions follows each `Substitution`.
         """
         coverage, D, _, weight, motion, *_ = means
         rows, substitutions = [rows_of(motion, direction) for direction in directions], []
@@ -491,21 +489,23 @@ class WeightedMortar(Formulation):
             additional[block.local[without_gap][np.arange(len(largest)), largest]] = True
         return (sufficient | additional) & (full_total > 0.0)
 
-    def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
+    def _mean_normals(self, overlap: Overlap, config: Configuration) -> Array:
         """Return unit means (m, dim) of the opposite primary normals; at unpaired nodes, the mean over all nodes.
 
         Against an obstacle they are the normals opposite the nodes themselves, which lie in the planes of symmetry of the
         model.
         """
         if isinstance(self.primary, RigidSide):
-            _, normal, paired, _ = self.primary.project(deformed[self.secondary.points], pose)
-            return np.where(paired[:, None], normal, -nodal_normals(self.secondary, deformed))
+            positions = (self.points + config.displacement)[self.secondary.points]
+            _, normal, paired, _ = self.primary.project(positions, config.pose)
+            return np.where(paired[:, None], normal, -config.deformed(self.secondary, self.points).nodal_normals)
         if self.normals == "secondary":
-            return -nodal_normals(self.secondary, deformed)
+            return -config.deformed(self.secondary, self.points).nodal_normals
         if not isinstance(self.normals, str):
             return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
-        mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
-        normals = (normals_at_nodes if self.normals == "facet" else smooth_normals)(self.primary, deformed)
+        mean = np.zeros((len(self.secondary.points), self.points.shape[1]))
+        primary = config.deformed(self.primary, self.points)
+        normals = primary.facet_normals if self.normals == "facet" else primary.smooth_normals
         of_blocks = np.split(normals, self.primary.offsets[1:-1])
         normals_of = dict(zip((block.element for block in self.primary.blocks), of_blocks, strict=True))
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))

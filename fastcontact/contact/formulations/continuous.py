@@ -29,11 +29,11 @@ from fastcontact.contact.integration import (
     mass_matrix,
 )
 from fastcontact.contact.pair_options import nodal_map
-from fastcontact.contact.pairing import Candidates, Normals, gap_rows
-from fastcontact.contact.projection import smooth_ends, smooth_normals
+from fastcontact.contact.pairing import Candidates, Normals, relative_motion
+from fastcontact.contact.projection import DeformedSide, smooth_ends
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError, unknown
-from fastcontact.linear.sparse_rows import shapes_at
+from fastcontact.linear.sparse_rows import rows_of, shapes_at
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import ROUND_OFF
 
@@ -86,7 +86,7 @@ class Continuous(PressureFieldFormulation):
         rho = self.augmentation * self.modulus / smallest_size
         self._candidates, full_areas = self._integration_points()
         usable_areas = np.where(self._candidates.belonging_to(self.excluded), 0.0, full_areas)
-        points = self._number_on_side[self._candidates.nodes], self._candidates.shape
+        points = self.number_on_side[self._candidates.nodes], self._candidates.shape
         P = shapes_at(points[1], points[0], len(self.secondary.points))
         field = self.with_common_values(self._independent_values(P, usable_areas))
         flags = {"has_new_points": False, "eliminable": self.eliminable, "quadratic": self.secondary.order > 1}
@@ -124,7 +124,7 @@ class Continuous(PressureFieldFormulation):
         """
         if self.integration is not None or self.points.shape[1] == 3 or isinstance(self.primary, Surface):
             return np.zeros(self.secondary.n_facets, bool)
-        smooth = smooth_ends(self.secondary, smooth_normals(self.secondary, self.points))
+        smooth = smooth_ends(self.secondary, DeformedSide(self.secondary, self.points).smooth_normals)
         for _, nodes in self.symmetry_planes:
             smooth |= np.isin(self.secondary.ends, nodes)
         return np.asarray(~smooth.all(axis=1))
@@ -207,11 +207,12 @@ class Continuous(PressureFieldFormulation):
         primary, used = self.primary, self._field
         assert isinstance(primary, Surface)
         points, areas = self._points_of(lambda name: quadrature.product_rule(elements.get(name).linear, FINE_POINTS))
-        local = self._number_on_side[points.nodes], points.shape
+        local = self.number_on_side[points.nodes], points.shape
         fine = PressureField.of_points(local, (areas, areas), 1.0, (used.nodal_map, used.independent), False)
         values, forces, rows = pressure[used.independent], [], csr_array((0, 0))
         for candidates, projection in ((self._candidates, used.projection), (points, fine.projection)):
-            rows, _ = gap_rows(candidates, self.pair_candidates(candidates, config), primary, self.points)
+            pairing = self.pair_candidates(candidates, config)
+            rows = rows_of(relative_motion(candidates, pairing, primary, len(self.points)), pairing.normal)
             forces.append((rows.T @ (projection.areas * (projection.P @ values))).reshape(self.points.shape))
         mass, error = mass_matrix(primary, self.points, self.axisymmetric).tocsc(), np.zeros_like(self.points)
         error[primary.points] = splu(mass).solve((forces[0] - forces[1])[primary.points])

@@ -198,12 +198,11 @@ class SegmentMortar(PressureFieldFormulation):
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
-        deformed = self.points + config.displacement
         assert isinstance(self.primary, Surface)
-        block = self.secondary.blocks[0]
+        block, primary = self.secondary.blocks[0], config.deformed(self.primary, self.points)
         n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
         options = self.axisymmetric, n_gauss, self.projection_tolerance, self._borders
-        samples = line_points(block, self.primary, self.points, deformed, *options)
+        samples = line_points(block, primary, self.points, *options)
         facet, shape, area = samples.facet, samples.shape, samples.area
         candidates = Candidates(block.facets[facet], shape, facet, samples.xi[:, None])
         pairing_of_points = self.pair_candidates(candidates, config)

@@ -27,7 +27,6 @@ from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import all_nodes_carry_pressure, even_at_axis, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, Pairing
-from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import ROUND_OFF
@@ -77,7 +76,7 @@ class NodeToSegment(Formulation):
         closest = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
-            normal = nodal_normals(self.primary, deformed)[closest]
+            normal = config.deformed(self.primary, self.points).nodal_normals[closest]
         assert nodes.facet is not None
         assert nodes.xi is not None
         return replace(pairing, facet=nodes.facet[closest], xi=nodes.xi[closest], normal=normal, beyond=None)

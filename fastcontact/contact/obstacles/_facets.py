@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import facet_normals, nodal_normals, normals_at_nodes, smooth_normals
+from fastcontact.contact.projection import DeformedSide, facet_normals
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -43,8 +43,9 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
     form an orientable surface.
     """
     side, numbers = _oriented(mesh, group, flip)
-    normals, smoothed = normals_at_nodes(side, mesh.points), smooth_normals(side, mesh.points, crease)
-    return SurfaceFacets(side, normals, smoothed, nodal_normals(side, mesh.points), _border(mesh, side, numbers))
+    deformed = DeformedSide(side, mesh.points, crease)
+    normals = deformed.facet_normals, deformed.smooth_normals, deformed.nodal_normals
+    return SurfaceFacets(side, *normals, _border(mesh, side, numbers))
 
 
 def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:

@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 import fastcontact as fc
 from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.held_motions import deflate, direction_fields, eigenspaces
-from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, rows_along
+from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, relative_motion
 from fastcontact.contact.projection import facet_points
 from fastcontact.contact.surface import surface
+from fastcontact.linear.sparse_rows import rows_of
 from fastcontact.mesh import elements
 from fastcontact.model.rigid_motions import cone_rows
 
@@ -120,14 +121,15 @@ def test_rows_are_sums_over_both_sides(sides):
     facet, xi = rng.integers(0, primary.n_facets, n), rng.uniform(-1, 1, (n, 1))
     pairing = Pairing(facet, xi, rng.normal(size=(n, 2)), rng.random(n) < 0.7)
     direction, u = rng.normal(size=(n, 2)), rng.normal(size=mesh.points.shape)
-    found = rows_along(direction, nodes, pairing, primary, u.size)
+    motion = relative_motion(nodes, pairing, primary, len(u))
+    found = rows_of(motion, direction)
     shape = elements.get(primary.only_block.element).shape(xi)
     theirs = np.einsum("nk,nkd->nd", shape, u[primary.only_block.facets[facet]])
     moved = np.einsum("nd,nd->n", direction, u[secondary.points] - theirs)
     np.testing.assert_allclose(found @ u.ravel(), np.where(pairing.paired, moved, 0.0), atol=1e-13)
     np.testing.assert_array_equal(np.diff(found.indptr) == 0, ~pairing.paired)
     assert found.has_canonical_format
-    G, gap = gap_rows(nodes, pairing, primary, mesh.points)
+    G, gap = gap_rows(motion, pairing, mesh.points)
     np.testing.assert_allclose(gap, G @ mesh.points.ravel())
 
 
@@ -136,7 +138,7 @@ def test_a_node_that_is_named_twice_counts_twice():
     side = surface(mesh, "CONT1")
     nodes = Candidates(np.repeat(side.points[:1, None], 2, axis=1), np.array([[0.25, 0.5]]))
     pairing = Pairing(np.array([5]), np.zeros((1, 1)), np.ones((1, 2)), np.ones(1, bool))
-    found = rows_along(np.array([[1.0, 0.0]]), nodes, pairing, side, mesh.points.size)
+    found = rows_of(relative_motion(nodes, pairing, side, mesh.n_points), np.array([[1.0, 0.0]]))
     assert found[0, 2 * side.points[0]] == 0.75
 
 

@@ -6,7 +6,7 @@ from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.contact.pairing import pair
-from fastcontact.contact.projection import smooth_normals
+from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.surface import surface
 
 WAYS = [
@@ -93,13 +93,13 @@ def test_who_wants_them_has_forces_beyond_the_edge_in_balance(dim, normals):
 def test_normals_are_averaged_on_what_is_smooth_and_kept_at_corners():
     model = punch(shift=0.5)
     side = surface(model.mesh, "U_WHOLE")
-    normals = smooth_normals(side, model.mesh.points)
+    normals = DeformedSide(side, model.mesh.points).smooth_normals
     middle = model.mesh.points[side.only_block.facets].mean(axis=1)
     expected = np.where(middle[:, 1:] < 1e-9, [0.0, -1.0], np.sign(middle[:, :1] - 1.0) * [1.0, 0.0])
     np.testing.assert_allclose(normals, np.repeat(expected[:, None], 2, axis=1), atol=1e-14)
     rings = fc.generate.rings("quad4", divisions_inner=(2, 8), divisions_outer=(2, 8))
     ring, points = surface(rings, "CONT_INNER"), rings.points
-    normals = smooth_normals(ring, points)
+    normals = DeformedSide(ring, points).smooth_normals
     inner = ring.inner_ends
     outward = points[ring.only_block.facets] / np.linalg.norm(points[ring.only_block.facets], axis=2, keepdims=True)
     np.testing.assert_allclose(normals[inner], outward[inner], atol=1e-14)
@@ -110,5 +110,5 @@ def test_points_beside_a_corner_face_nothing():
     mesh = punch(shift=0.5).mesh
     beside = np.array([[0.5 - 0.03, -0.01], [0.5 + 0.03, -0.01]])
     for normals in ("facet", "averaged"):
-        found = pair(beside, surface(mesh, "U_WHOLE"), mesh.points, 0.05, normals)
+        found = pair(beside, DeformedSide(surface(mesh, "U_WHOLE"), mesh.points), 0.05, normals)
         assert found.paired.tolist() == [False, True]

@@ -9,14 +9,13 @@ from fastcontact._jit import decorators
 from fastcontact.contact import projection, projection_kernels
 from fastcontact.contact.pairing import pair
 from fastcontact.contact.projection import (
+    DeformedSide,
     along_line_normals,
     along_normals,
     closest_of_types,
     facet_normals,
     facet_points,
     interpolate,
-    nodal_normals,
-    smooth_normals,
 )
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
@@ -34,9 +33,9 @@ def wavy(element, n=8):
 
 def projected(candidates, side, points, project=along_normals):
     """Return the normals at the nodes of facets, the closest points, and the projection along the normals."""
-    normals = smooth_normals(side, points)
-    start = closest_of_types(candidates, side.node_positions(points))
-    return normals, start, project(candidates, side, points, normals, start)
+    deformed, start = DeformedSide(side, points), closest_of_types(candidates, side.node_positions(points))
+    normals = deformed.smooth_normals
+    return normals, start, project(candidates, deformed, normals, start)
 
 
 def feet(side, points, facet, xi):
@@ -78,7 +77,7 @@ def test_the_projection_moves_on_smoothly_over_folds(element):
     x = np.linspace(0.1, 3.9, 4001)
     track = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + 0.15])
     for normals, most in (("averaged", 4.0), ("facet", np.inf)):
-        found = pair(track, side, mesh.points, 1e-6, normals)
+        found = pair(track, DeformedSide(side, mesh.points), 1e-6, normals)
         foot = feet(side, mesh.points, found.facet, found.xi)
         turned = np.linalg.norm(np.diff(found.normal, axis=0), axis=1)
         if normals == "averaged":
@@ -94,7 +93,7 @@ def test_beyond_the_end_a_point_stands_out():
     mesh = fc.generate.block((4.0, 1.0), (8, 1), "quad4")
     side = surface(mesh, "TOP")
     for by, tolerance, paired in ((0.001, 0.5, True), (0.2, 0.5, True), (0.35, 0.5, False), (0.001, 1e-6, False)):
-        found = pair(np.array([[4.0 + by, 1.2], [-by, 0.9]]), side, mesh.points, tolerance, "averaged")
+        found = pair(np.array([[4.0 + by, 1.2], [-by, 0.9]]), DeformedSide(side, mesh.points), tolerance, "averaged")
         assert found.paired.tolist() == [paired, paired]
 
 
@@ -108,7 +107,9 @@ def test_a_closed_line_has_no_end():
     )
     side = surface(mesh, "OUT")
     angle = np.linspace(0.0, 2 * np.pi, 100)
-    found = pair(1.1 * np.column_stack([np.cos(angle), np.sin(angle)]), side, mesh.points, 1e-6, "averaged")
+    found = pair(
+        1.1 * np.column_stack([np.cos(angle), np.sin(angle)]), DeformedSide(side, mesh.points), 1e-6, "averaged"
+    )
     assert found.paired.all()
     # On a circle nodal means are radial, so the projection runs towards the centre.
     assert np.abs(found.normal - np.column_stack([np.cos(angle), np.sin(angle)])).max() < 1e-12
@@ -165,7 +166,7 @@ def test_means_are_weighted_by_the_angles_at_corners(element):
                 weight = np.arccos(p @ q / np.linalg.norm(p) / np.linalg.norm(q))
             total[block.local[row, a]] += weight * own[row, a]
     total /= np.linalg.norm(total, axis=1, keepdims=True)
-    assert nodal_normals(side, points) == pytest.approx(total, abs=1e-13)
+    assert DeformedSide(side, points).nodal_normals == pytest.approx(total, abs=1e-13)
 
 
 @pytest.mark.parametrize("element", KINDS)
@@ -199,7 +200,7 @@ def test_a_facet_that_is_left_hands_on_to_the_one_beside_it_of_any_kind():
     begin, beside = side.neighbours
     wrong = np.array([beside[begin[f]] for f in facet])
     corner = np.where(side.triangular[wrong, None], 0.3, 0.0) * np.ones((1, 2))
-    again = along_normals(candidates, side, points, normals, start._replace(facet=wrong, xi=corner))
+    again = along_normals(candidates, DeformedSide(side, points), normals, start._replace(facet=wrong, xi=corner))
     foot, same = feet(side, points, facet, xi), feet(side, points, *again[:2])
     # Where the facet of the start lies too far away for its plane to mean anything, the start is kept.
     aside = np.abs(np.cross(candidates - same, again[3])).max(axis=1)
@@ -214,7 +215,7 @@ def test_where_no_step_is_possible_the_closest_point_stays():
     normals = np.tile([1.0, 0.0, 0.0], (side.n_facets, 4, 1))  # along the facets
     candidates = above(20, beside=-0.1)
     start = closest_of_types(candidates, side.node_positions(points))
-    facet, xi, _, _ = along_normals(candidates, side, points, normals, start)
+    facet, xi, _, _ = along_normals(candidates, DeformedSide(side, points), normals, start)
     assert (facet == start.facet).all()
     assert (xi == start.xi).all()
 
@@ -235,7 +236,7 @@ def test_corners_are_taken_one_by_one():
     side = surface(mesh.replace(cell_groups={**mesh.cell_groups, "ALL": np.concatenate(
         [mesh.cell_groups[name] for name in ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX")]
     )}), "ALL")  # fmt: skip
-    normals = smooth_normals(side, mesh.points)
+    normals = DeformedSide(side, mesh.points).smooth_normals
     assert normals == pytest.approx(facet_normals(side.blocks[0], mesh.points), abs=1e-15)
 
 
@@ -245,7 +246,7 @@ def test_threads_change_no_bit(monkeypatch):
     candidates = above(200)
     normals, start, alone = projected(candidates, side, points)
     monkeypatch.setattr(projection, "portions", lambda count, nodes=1: [(0, 3), (3, count // 2), (count // 2, count)])
-    for one, other in zip(alone, along_normals(candidates, side, points, normals, start), strict=True):
+    for one, other in zip(alone, along_normals(candidates, DeformedSide(side, points), normals, start), strict=True):
         assert (one == other).all()
     for block in side.blocks:
         assert np.array_equal(facet_normals(block, points), facet_normals(block, points))

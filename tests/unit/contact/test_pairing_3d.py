@@ -10,8 +10,8 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations.continuous import Continuous
 from fastcontact.contact.formulations.node_to_segment import NodeToSegment
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule, mass_matrix, nodal_areas
-from fastcontact.contact.pairing import Candidates, gap_rows, pair
-from fastcontact.contact.projection import facet_points, interpolate, nodal_normals, smooth_normals
+from fastcontact.contact.pairing import Candidates, gap_rows, pair, relative_motion
+from fastcontact.contact.projection import DeformedSide, facet_points, interpolate
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import quadrature
 from fastcontact.mesh.generate import box, merge_points, sphere_octant, union
@@ -32,8 +32,8 @@ def test_areas_and_normals_of_a_sphere(element):
     mesh = sphere_octant(element, R=2.0, size=1.0, contact_size=0.2, contact_radius=0.4)
     side = surface(mesh, "CONT_SPHERE")
     facet = np.arange(side.n_facets)
-    normals, quadratic = nodal_normals(side, mesh.points), side.order == 2
-    smooth = smooth_normals(side, mesh.points)
+    normals, quadratic = DeformedSide(side, mesh.points).nodal_normals, side.order == 2
+    smooth = DeformedSide(side, mesh.points).smooth_normals
     outward = (mesh.points[side.points] - [0, 2, 0]) / 2.0
     assert np.abs(normals - outward).max() < (2e-2 if quadratic else 0.2)
     inner = np.linalg.norm(outward[:, [0, 2]], axis=1) < 0.5
@@ -60,10 +60,10 @@ def test_a_surface_may_mix_triangles_and_quadrangles(order):
     assert mass_matrix(side, mesh.points, False).sum() == pytest.approx(1.0, rel=1e-14)
     positions = np.random.default_rng(0).uniform([0.02, 0.02, 0.8], [0.98, 0.98, 1.8], (50, 3))
     for normals in ("facet", "averaged"):
-        found = pair(positions, side, mesh.points, 0.5, normals)
+        found = pair(positions, DeformedSide(side, mesh.points), 0.5, normals)
         candidates = Candidates(np.zeros((50, 1), np.int32), np.zeros((50, 1)))
         # Without the candidates' own nodes the rows give minus the height of the surface under them.
-        B, gap = gap_rows(candidates, found, side, mesh.points)
+        B, gap = gap_rows(relative_motion(candidates, found, side, mesh.n_points), found, mesh.points)
         assert gap == pytest.approx(-1.0, abs=1e-14)
         assert B.sum(axis=1) == pytest.approx(-1.0, abs=1e-14)
         assert found.normal == pytest.approx(np.tile([0.0, 0, 1], (50, 1)), abs=1e-14)
@@ -90,7 +90,7 @@ def test_projection_along_averaged_normals_is_continuous():
 
     def feet(n, normals):
         path = start + np.linspace(0, 1, n + 1)[:, None] * (end - start)
-        found = pair(path, side, mesh.points, 0.5, normals)
+        found = pair(path, DeformedSide(side, mesh.points), 0.5, normals)
         assert found.paired.all()
         at = facet_points(side, found.facet, found.xi)
         foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
@@ -115,9 +115,9 @@ def test_gap_rows_do_not_see_rigid_motions():
     candidates = Candidates(nodes, shape)
     lifted = mesh.points.copy()
     lifted[nodes.ravel()] = np.random.default_rng(2).uniform([0.2, 0.2, 1.2], [0.8, 0.8, 1.4], (6, 3))
-    found = pair(candidates.positions(lifted), side, lifted, 0.5, "averaged")
+    found = pair(candidates.positions(lifted), DeformedSide(side, lifted), 0.5, "averaged")
     assert found.paired.all()
-    B, gap = gap_rows(candidates, found, side, lifted)
+    B, gap = gap_rows(relative_motion(candidates, found, side, mesh.n_points), found, lifted)
     assert (gap > 0).all()
     shift = np.tile([0.3, -0.2, 0.7], len(mesh.points))
     assert np.abs(B @ shift).max() < 1e-14
@@ -194,8 +194,8 @@ def test_turning_the_surface_turns_the_pairing():
     turned = mesh.replace(points=mesh.points @ turn.T)
     positions = np.random.default_rng(5).uniform([0.05, 0.05, 1.0], [0.95, 0.95, 1.1], (100, 3))
     for normals in ("facet", "averaged"):
-        one = pair(positions, surface(mesh, "ZMAX"), mesh.points, 0.5, normals)
-        other = pair(positions @ turn.T, surface(turned, "ZMAX"), turned.points, 0.5, normals)
+        one = pair(positions, DeformedSide(surface(mesh, "ZMAX"), mesh.points), 0.5, normals)
+        other = pair(positions @ turn.T, DeformedSide(surface(turned, "ZMAX"), turned.points), 0.5, normals)
         assert np.array_equal(one.facet, other.facet)
         assert np.abs(one.xi - other.xi).max() < 1e-11
         assert np.abs(one.normal @ turn.T - other.normal).max() < 1e-12

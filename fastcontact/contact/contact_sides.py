@@ -1,0 +1,285 @@
+"""The two sides of a contact pair, and the pairing, the gaps and the slips of points of the secondary side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.held_motions import HeldMotions, reflected, symmetry_planes
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pair_options import PairOptions
+from fastcontact.contact.pairing import (
+    OVERHANG,
+    Candidates,
+    Normals,
+    Pairing,
+    checked_normals,
+    gap_rows,
+    pair,
+    relative_motion,
+    tangents,
+    with_secondary_normals,
+)
+from fastcontact.contact.projection import SMALL_OVERHANG, facet_points, interpolate
+from fastcontact.contact.surface import Surface
+from fastcontact.contact.surface_smoothing import Smoothing
+from fastcontact.errors import ContactError, unknown
+from fastcontact.linear.sparse_rows import rows_of
+from fastcontact.mesh import elements
+from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
+
+SLIPS = ("symmetric", "primary")
+
+
+@dataclass(eq=False)
+class ContactSides:
+    """The two sides of a contact pair, and options of their geometry, which are described in `Formulation`."""
+
+    secondary: Surface
+    primary: Surface | RigidSide
+    points: Array
+    axisymmetric: bool
+    modulus: float
+
+    friction: float = 0.0
+    projection_tolerance: float | None = None
+    normals: Normals | None = None
+    slip: str = "symmetric"
+    surface_smoothing: bool = False
+    options: PairOptions = field(default_factory=PairOptions, repr=False)
+    held_motions: HeldMotions | None = field(default=None, repr=False)
+    # Points (n_points,) that are excluded from contact.
+    excluded: Mask = field(init=False, repr=False)
+    # Whether the constraints need tangents, for friction, tying or a cohesive layer; adhesion needs none.
+    has_tangents: bool = field(init=False, repr=False)
+    # Whether gaps are linearised at the mean of the displacements of the pairing and of its solution, which reduces the error
+    # of a Newton step. Otherwise, they are linearised at the displacements of the pairing.
+    linearised_at_mean: bool = field(init=False, default=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.normals is None:
+            self.normals = "facet" if self.points.shape[1] == 2 and not self.surface_smoothing else "averaged"
+        self.normals = checked_normals(self.normals, self.points, self.primary)
+        if self.slip not in SLIPS:
+            raise ContactError(unknown("kind of slip", self.slip, SLIPS))
+        if not (np.isfinite(self.friction) and self.friction >= 0):
+            raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
+        if self.projection_tolerance is None:
+            self.projection_tolerance = SMALL_OVERHANG if self.points.shape[1] == 2 else OVERHANG
+        if not self.projection_tolerance >= 0:
+            raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
+        if self.surface_smoothing and not isinstance(self.primary, Surface):
+            raise ContactError("surface_smoothing needs two meshed sides: leave it out at an obstacle")
+        if self.friction:
+            secondary, primary = self.secondary, self.primary
+            self.secondary = reflected(secondary, self.held_motions, self.points, primary.points)
+            if isinstance(primary, Surface):
+                self.primary = reflected(primary, self.held_motions, self.points, secondary.points)
+        excluded, cohesion = self.options.excluded, self.options.cohesion
+        self.excluded = np.zeros(len(self.points), bool) if excluded is None else excluded
+        has_shear_tractions = cohesion is not None and not cohesion.reversible
+        self.has_tangents = bool(self.friction) or self.options.kind == "tied" or has_shear_tractions
+
+    @cached_property
+    def smoothing(self) -> Smoothing | None:
+        """The smooth surfaces of both sides; None without smoothing, for flat sides, and with a constant normal."""
+        if not self.surface_smoothing or self.options.kind == "tied" or not isinstance(self.normals, str):
+            return None
+        assert isinstance(self.primary, Surface)
+        return Smoothing.of(self.secondary, self.primary, self.points)
+
+    @cached_property
+    def symmetry_planes(self) -> list[tuple[Array, Indices]]:
+        """The planes of symmetry at the ends of the secondary surface, see `held_motions.symmetry_planes`."""
+        held, opposite = self.held_motions, self.points[self.primary.points]
+        return [] if held is None else symmetry_planes(held, self.secondary, self.points, opposite)
+
+    @cached_property
+    def node_candidates(self) -> Candidates:
+        """The secondary nodes as candidates."""
+        return Candidates.from_side(self.secondary)
+
+    @cached_property
+    def shortest_edge(self) -> float:
+        """Smallest diameter of the facets, divided by the order of their shape functions [length]."""
+        blocks = self.secondary.blocks
+        return float(min(b.diameters(self.points).min() / elements.get(b.element).order for b in blocks))
+
+    @cached_property
+    def held_nodes(self) -> Indices:
+        """The secondary nodes that supports hold, numbered on the side."""
+        held = () if self.held_motions is None else self.held_motions.nodes
+        return np.flatnonzero(np.isin(self.secondary.points, held))
+
+    def pair_candidates(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
+        """Return the pairing of candidates in the deformed configuration, with the options of the formulation.
+
+        If `tolerance` is given, it replaces `projection_tolerance`.
+        """
+        largest_overhang = (self.projection_tolerance or 0.0) if tolerance is None else tolerance
+        assert self.normals is not None
+        positions = candidates.positions(self.points + config.displacement)
+        primary = self.primary if isinstance(self.primary, RigidSide) else config.deformed(self.primary, self.points)
+        pairing = pair(positions, primary, largest_overhang, self.normals, config.pose, config.rounded)
+        if self.normals != "secondary":
+            return pairing
+        return with_secondary_normals(pairing, self._secondary_normals(candidates, config))
+
+    @cached_property
+    def number_on_side(self) -> Indices:
+        """Number (n_points,) of each secondary node on its side; zero for other points."""
+        numbers = np.zeros(len(self.points), np.intp)
+        numbers[self.secondary.points] = np.arange(len(self.secondary.points))
+        return numbers
+
+    def _secondary_normals(self, candidates: Candidates, config: Configuration) -> Array:
+        """Return averaged unit normals (n, dim) of the secondary side at candidates."""
+        nodal_normals = config.deformed(self.secondary, self.points).nodal_normals
+        normal = np.einsum("nk,nkd->nd", candidates.shape, nodal_normals[self.number_on_side[candidates.nodes]])
+        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
+
+    def slip_at_rest(
+        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
+    ) -> Array:
+        """Return the part (k, n) of the slips of candidates in the load step that does not depend on displacements [length].
+
+        It is minus the motion of a rigid primary side in the step. Between two bodies, if `slip` is ``"symmetric"``, it is
+        minus the tangential displacement that closes the gap. On curved surfaces, in particular at the edge of the contact,
+        the normal of the primary side is inclined to the direction in which the gap closes. A component of this motion would
+        then count as slip. The gap is assumed to close along the mean of the normals of both sides, which is exact for two
+        bodies that are mirror images. `directions` are k unit tangents (n, dim).
+        """
+        if isinstance(self.primary, RigidSide):
+            obstacle_motion = self.rigid_motion(candidates.positions, config)
+            return -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
+        slip0, rows = np.zeros((len(directions), len(pairing.paired))), np.flatnonzero(pairing.paired)
+        if self.slip != "symmetric":
+            return slip0
+        start = self.points + config.start
+        feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
+        nodes, shape = candidates.nodes[rows], candidates.shape[rows]
+        primary = config.deformed(self.primary, self.points)
+        mean = interpolate(primary.smooth_normals[pairing.facet[rows]], feet)
+        mean -= self._secondary_normals(Candidates(nodes, shape), config)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
+        offset = np.einsum("nk,nkd->nd", shape, start[nodes])
+        offset -= np.einsum("nk,nkd->nd", feet.shape, start[feet.nodes])
+        initial_gap = np.einsum("nd,nd->n", mean, offset)
+        for slip, direction in zip(slip0, directions, strict=True):
+            slip[rows] = np.einsum("nd,nd->n", direction[rows], mean) * initial_gap
+        return slip0
+
+    def added_gap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
+        """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
+        added, rows, options = np.zeros(len(candidates.nodes)), np.flatnonzero(pairing.paired), self.options
+        nodes, shape = candidates.nodes[rows], candidates.shape[rows]
+        if options.clearance is not None and len(rows):
+            added[rows] += options.clearance(np.einsum("nk,nkd->nd", shape, self.points[nodes]))
+        if options.clearance_primary is not None and isinstance(self.primary, Surface) and len(rows):
+            feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
+            added[rows] += options.clearance_primary(np.einsum("nk,nkd->nd", feet.shape, self.points[feet.nodes]))
+        added *= config.clearance_factor
+        if config.wear_depth is not None:
+            added[rows] += np.einsum("nk,nk->n", shape, config.wear_depth[nodes])
+        return added
+
+    def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
+        """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length].
+
+        They are zero without `smoothing`.
+        """
+        overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
+        if self.smoothing is None or candidates.facet is None or candidates.xi is None:
+            return overlap
+        on_secondary = candidates.facet[rows], candidates.xi[rows]
+        on_primary = pairing.facet[rows], pairing.xi[rows]
+        overlap[rows] = self.smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
+        return overlap
+
+    def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
+        """Return the derivatives (n, dim - 1) of `smoothing_overlap` with respect to primary reference coordinates [length].
+
+        `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
+        zero on the straight extensions of facets, and None without `smoothing`.
+        """
+        if self.smoothing is None or candidates.facet is None:
+            return None
+        axes = self.smoothing.frames(deformed)
+        factor = self.smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
+        slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
+        return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
+
+    def rigid_motion(self, positions: Callable[[Array], Array], config: Configuration) -> Array:
+        """Return the displacements (n, dim) in the step of the obstacle points opposite to n points [length].
+
+        `positions` is the function from the coordinates (n_points, dim) of all nodes to those of the points.
+        """
+        assert isinstance(self.primary, RigidSide)
+        current, initial = (positions(self.points + u) for u in (config.displacement, config.start))
+        return self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
+
+    def first_contact(self, config: Configuration) -> tuple[Array, Array]:
+        """Return the point of first contact (dim,) [length], and the unit normal (dim,) of the primary side there [-].
+
+        The point is the secondary node with the smallest gap to the undeformed primary side. If several gaps are equal, it is
+        the node nearest to the origin.
+        """
+        positions = self.points[self.secondary.points]
+        gap, normal = self.nodal_gap(replace(config, displacement=np.zeros_like(self.points)))
+        closest_nodes = np.flatnonzero(gap <= gap.min() + LENGTH_ROUND_OFF * np.ptp(positions, axis=0).max())
+        first = closest_nodes[np.argmin(np.linalg.norm(positions[closest_nodes], axis=1))]
+        return positions[first], normal[first]
+
+    def nodal_gap(
+        self, config: Configuration, with_clearance: bool = True, displacement: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return the gaps of the secondary nodes, and the opposite normals.
+
+        Parameters
+        ----------
+        config : Configuration
+            Positions of both sides at which the nodes are paired.
+        with_clearance : bool
+            Whether the gaps include clearances and wear.
+        displacement : ndarray (n_points, dim), optional
+            Displacements for which the gaps are evaluated; by default those of `config` [length].
+
+        Returns
+        -------
+        gap : ndarray (n_nodes,)
+            Gaps, infinite for nodes without an opposite facet [length].
+        normal : ndarray (n_nodes, dim)
+            Unit normals of the primary side [-].
+        """
+        nodes = self.node_candidates
+        pairing = self.pair_candidates(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
+        G, gap0 = gap_rows(relative_motion(nodes, pairing, self.primary, len(self.points)), pairing, self.points)
+        gap0 -= self.smoothing_overlap(nodes, pairing, config)
+        if with_clearance:
+            gap0 += self.added_gap(nodes, pairing, config)
+        u = config.displacement if displacement is None else displacement
+        return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
+
+    def nodal_slip(self, config: Configuration) -> Array:
+        """Return the slips (n_nodes, dim) of the secondary nodes in the load step, as vectors [length].
+
+        Nodes beyond the end of the primary side are included, because parts of their facets may carry pressure.
+        """
+        nodes = self.node_candidates
+        pairing = self.pair_candidates(nodes, config, np.inf)
+        directions = tangents(pairing.normal)
+        motion = relative_motion(nodes, pairing, self.primary, len(self.points))
+        slip0, increment = (
+            self.slip_at_rest(nodes, pairing, directions, config),
+            (config.displacement - config.start).ravel(),
+        )
+        slip = np.zeros_like(pairing.normal)
+        for constant, direction in zip(slip0, directions, strict=True):
+            slip += (rows_of(motion, direction) @ increment + constant)[:, None] * direction
+        return np.where(pairing.paired[:, None], slip, 0.0)
