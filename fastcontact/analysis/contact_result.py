@@ -399,12 +399,12 @@ def areas(pair: Formulation, displacement: Array) -> tuple[Array, Array]:
 def _stretch(contact: ContactResult, displacement: Array, before: Array, after: Array) -> tuple[float, float]:
     """Return the ratios of the deformed to the undeformed contact width, for both bounds of the width [-].
 
-    In 3D both are the square root of the area ratio of the closed nodes.
+    In 3D both are the square root of the area ratio of the closed nodes, and without a tangent in plane models this ratio.
     """
     if not contact.active.any():
         return 1.0, 1.0
-    if contact.coordinates.shape[1] == 3:
-        stretch = float(np.sqrt(after[contact.active].sum() / before[contact.active].sum()))
+    if (dim := contact.coordinates.shape[1]) == 3 or (contact.tangent is None and not contact.measured_from_axis):
+        stretch = float((after[contact.active].sum() / before[contact.active].sum()) ** (1.0 / (dim - 1)))
         return stretch, stretch
     tangential = displacement[:, 0] if contact.tangent is None else displacement @ contact.tangent
     widths = (half_width(contact.place, contact.active, contact.across + k * tangential) for k in (0.0, 1.0))

@@ -22,9 +22,10 @@ from fastcontact.analysis.wear import ratio_to_elastic_waves
 from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.integration import lumped_areas
+from fastcontact.contact.integration import areas_of_rule, fine_rule, lumped_areas
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
+from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.supported_nodes import nodes_with_undetermined_traction
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
@@ -92,7 +93,7 @@ def result_warnings(
         undetermined = _undetermined_tractions(pair, contact, nodes_with_undetermined_traction(pair, configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *_open_contact(problem, state, name, last, loaded)]
         warnings += undetermined
-        unresolved = _unresolved(pair, configuration, contact, state)
+        unresolved = _unresolved(problem, pair, configuration, contact, state)
         oscillation = list(pressure_oscillation(pair, contact, problem.model))
         oscillation = oscillation or list(_quadrature_error(pair, configuration, contact, problem.model))
         pressures = [*unresolved, *oscillation]
@@ -100,7 +101,10 @@ def result_warnings(
         if not pressures and index != last.index:
             peak = contacts[name]
             at_peak = replace(Configuration.displaced(displacement), pose=_pose(peak))
-            texts = [*_unresolved(pair, at_peak, peak, state), *pressure_oscillation(pair, peak, problem.model)]
+            texts = [
+                *_unresolved(problem, pair, at_peak, peak, state),
+                *pressure_oscillation(pair, peak, problem.model),
+            ]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += pressures or _shear_oscillation(pair, contact)
         warnings += [*_pressure_peak_at_edge(pair, last, contact), *_sliding_past_ends(pair, contact)]
@@ -109,11 +113,14 @@ def result_warnings(
     return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]
 
 
-def _unresolved(pair: Formulation, configuration: Configuration, contact: ContactResult, state: State) -> list[str]:
-    """Return the warnings about few facets in contact, or about facets that deviate from curved surfaces."""
+def _unresolved(
+    problem: Problem, pair: Formulation, configuration: Configuration, contact: ContactResult, state: State
+) -> list[str]:
+    """Return the warnings about contact areas or shapes that the facets do not resolve."""
+    edge = [] if problem.criteria.keep_pairing else _past_edge(pair, configuration, contact, problem.model.strain)
     coarse, sag = list(_coarse_contact(pair, contact, state)), sag_warning(pair, configuration, contact)
     # Against rigid shapes, refinement also reduces the sag.
-    return coarse if coarse and isinstance(pair.primary, RigidSide) else sag or coarse
+    return [*edge, *(coarse if coarse and isinstance(pair.primary, RigidSide) else sag or coarse)]
 
 
 def _pose(contact: ContactResult) -> Pose:
@@ -151,6 +158,38 @@ def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: A
             f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
             f"raise its penalty from {penalty:.4g} to about {2 * penalty * depth / (NOTABLE * size):.2g}, or omit it. If it "
             f"is the stiffness of a layer, such as a gasket, give it as a table: penalty=[(0, 0), (1, {penalty:.4g})]"
+        )
+
+
+def _past_edge(pair: Formulation, configuration: Configuration, contact: ContactResult, strain: str) -> Iterator[str]:
+    """Yield a warning where a surface has deformed past the edge of a rigid obstacle, beyond which it carries no force.
+
+    With small strains, areas do not change, and the contact area therefore decreases. With finite strains it only decreases
+    because a facet is cut. Under a punch on a plastic half-space, the force is 17 % too small where the estimate is 16 %.
+    """
+    side, primary, pose = pair.secondary, pair.primary, configuration.pose
+    positions, facing, areas = (pair.points, pair.points + configuration.displacement), [], []
+    if not isinstance(primary, RigidSide) or primary.project(positions[1][side.points], pose)[2].all():
+        return
+    candidates = Candidates.in_facets(side, [fine_rule(block.element)[0] for block in side.blocks])
+    for points in positions:
+        at_points = primary.project(candidates.positions(points), pose)[2].astype(float)
+        if pair.name == "node_to_segment":
+            at_nodes = primary.project(points[candidates.nodes.ravel()], pose)[2].reshape(candidates.nodes.shape)
+            at_points = (candidates.shape * at_nodes).sum(axis=1)
+        measured_at = points if strain == "finite" else pair.points
+        of_blocks = [areas_of_rule(block, measured_at, pair.axisymmetric)[1].ravel() for block in side.blocks]
+        facing.append(at_points)
+        areas.append(float(np.concatenate(of_blocks) @ at_points))
+    in_contact = np.isin(candidates.nodes, side.points[contact.active]).any(axis=1)
+    if areas[0] - areas[1] > NOTABLE * areas[0] and (in_contact & (facing[1] < facing[0])).any():
+        remedy = (
+            "use Criteria(keep_pairing=True), which keeps it in contact" if strain == "small" else "use smaller facets"
+        )
+        yield (
+            f"contact '{contact.name}': '{side.group}' has deformed past the edge of the obstacle. "
+            f"{1.0 - areas[1] / areas[0]:.1%} of the area below the obstacle therefore carries no contact force, and the force "
+            f"may be too small by as much: {remedy}"
         )
 
 

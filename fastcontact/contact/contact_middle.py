@@ -10,6 +10,8 @@ In plane models, positions are arc lengths along the surface, so that a ring is 
 the surface runs along the axis, as in a press fit of cylinders, or is closed, like that of an O-ring. In 3D, positions are
 distances from the line through the middle along the mean normal.
 
+A contact that crosses periodic ends is joined there: its parts at the second end are moved to the first one.
+
 The half-width of a contact in a plane model is measured on its projection along the mean normal. For a pin in a hole it is
 half the chord, not half the arc.
 """
@@ -17,8 +19,10 @@ half the chord, not half the arc.
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import diags_array
+from scipy.sparse.csgraph import connected_components
 
-from fastcontact._tools.records import record
+from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import FACING
@@ -37,18 +41,13 @@ class UnrolledLine:
         Positions of the nodes in order; the first is repeated at the end of a closed line [length].
     abscissa : ndarray (k,)
         Arc length along the line to each node [length].
-    closed : bool
-        Whether the line ends where it begins.
+    period : float
+        Arc length after which the line ends where it begins, or is continued by periodicity; 0 otherwise [length].
     """
 
     nodes: Array
     abscissa: Array
-    closed: bool = False
-
-    @property
-    def length(self) -> float:
-        """Total length of the line [length]."""
-        return float(self.abscissa[-1])
+    period: float = 0.0
 
     def point_at(self, length: float) -> Array:
         """Return the point (2,) at an arc length along the line [length]."""
@@ -79,7 +78,8 @@ def unrolled_line(surface: Surface, coordinates: Array, middle: Array | None) ->
     nodes = np.roll(nodes, -int(np.argmax(distance)), axis=0)
     nodes = np.concatenate([nodes, nodes[:1]])
     lengths = np.linalg.norm(np.diff(nodes, axis=0), axis=1)
-    return UnrolledLine(nodes, np.concatenate([[0.0], np.cumsum(lengths)]), closed=True)
+    abscissa = np.concatenate([[0.0], np.cumsum(lengths)])
+    return UnrolledLine(nodes, abscissa, period=float(abscissa[-1]))
 
 
 def _nodes_of_closed_line(surface: Surface) -> list[int] | None:
@@ -113,7 +113,10 @@ class ContactMiddle:
         Unit vectors along which the model represents an infinite surface [-].
     tangent : ndarray (dim,), optional
         Direction along which half-widths are measured [-]. If None, half-widths are measured by `distances`: for a middle on
-        the axis, in 3D, and on a ring that is in contact along its complete circumference.
+        the axis, in 3D, on a ring that is in contact along its complete circumference, and across periodic ends.
+    periods : tuple of (ndarray (dim,), ndarray (dim,), ndarray (dim, dim))
+        In 3D, corresponding points at the periodic ends which the contact crosses [length], and the rotation from the first
+        to the second end [-].
     """
 
     position: Array
@@ -123,14 +126,19 @@ class ContactMiddle:
     direction: Array | None = None
     ignored: tuple[Array, ...] = ()
     tangent: Array | None = None
+    periods: tuple[tuple[Array, Array, Array], ...] = ()
 
     def distances(self, positions: Array) -> Array:
         """Return the distances (n,) of reference positions (n, dim) from the middle, signed along a line [length]."""
         if self.line is not None:
             arc_length = self.line.lengths(positions) - self.start
-            if self.line.closed:
-                arc_length -= self.line.length * np.round(arc_length / self.line.length)
+            if self.line.period:
+                arc_length -= self.line.period * np.round(arc_length / self.line.period)
             return -arc_length if self.reversed else arc_length
+        for first, second, rotation in self.periods:
+            images = [positions, first + (positions - second) @ rotation, second + (positions - first) @ rotation.T]
+            closest_image = np.linalg.norm(np.array(images) - self.position, axis=2).argmin(axis=0)
+            positions = np.array(images)[closest_image, np.arange(len(positions))]
         offset = positions - self.position
         for direction in (*self.ignored, *(() if self.direction is None else (self.direction,))):
             offset -= (offset @ direction)[:, None] * direction
@@ -152,7 +160,14 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     gap : ndarray (n_nodes,)
         Gaps; the middle of an open contact is where the gap is smallest [length].
     """
-    surface, points = pair.secondary, pair.points[pair.secondary.points]
+    surface, points, normal = pair.secondary, pair.points[pair.secondary.points], normal.copy()
+    crossed = list[tuple[int, int, Array]]()
+    for first, second, rotation in surface.periodic_ends:
+        moved = _parts_at_second_end(surface, closed | (force != 0.0), first, second)
+        if first is not second and moved.any():  # not a plane of symmetry
+            crossed.append((int(first[0]), int(second[0]), rotation))
+            points[moved] = points[first[0]] + (points[moved] - points[second[0]]) @ rotation
+            normal[moved] = normal[moved] @ rotation
     weight = _weights(force, gap)
     mean = weight @ normal
     dim = points.shape[1]
@@ -165,8 +180,23 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
         near_closed = surface.node_adjacency @ closed > 0
         planes = [(axis, nodes) for axis, nodes in planes if near_closed[nodes].any()]
     if dim == 2:
-        return _middle_in_2d(surface, pair.points, weight, planes, mean)
-    return _middle_in_3d(points, weight, planes, mean)
+        return _middle_in_2d(surface, pair.points, points, weight, planes, mean, crossed)
+    middle, nodes = _middle_in_3d(points, weight, planes, mean), pair.points[surface.points]
+    periods = tuple((nodes[first], nodes[second], rotation) for first, second, rotation in crossed)
+    return replace(middle, periods=periods) if periods else middle
+
+
+def _parts_at_second_end(surface: Surface, closed: Mask, first: Indices, second: Indices) -> Mask:
+    """Return the nodes (n_nodes,) of the parts of a contact at the second of two periodic ends that do not reach the first.
+
+    Only one of two coincident nodes, `first` (k,) and `second` (k,), may be `closed` (n_nodes,).
+    """
+    closed = closed.copy()
+    closed[first] = closed[second] = closed[first] | closed[second]
+    in_contact = diags_array(closed.astype(float))
+    label = connected_components(in_contact @ surface.node_adjacency @ in_contact, directed=False)[1]
+    at_first, at_second = (np.unique(label[end[closed[end]]]) for end in (first, second))
+    return np.isin(label, np.setdiff1d(at_second, at_first))
 
 
 def _middle_in_3d(points: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array) -> ContactMiddle:
@@ -210,20 +240,27 @@ def _weights(force: Array, gap: Array) -> Array:
 
 
 def _middle_in_2d(
-    surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array
-) -> ContactMiddle:
+    surface: Surface, coordinates: Array, points: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array,
+    crossed: list[tuple[int, int, Array]],
+) -> ContactMiddle:  # fmt: skip
     """Return the middle on a surface in a plane model.
 
-    A surface in several pieces is projected along its mean normal.
+    A surface in several pieces is projected along its mean normal. The positions `points` (n_nodes, 2) of the nodes differ
+    from their `coordinates` [length] if the contact has `crossed` periodic ends, see `contact_middle`.
     """
-    points, length = coordinates[surface.points], float(np.linalg.norm(mean))
+    length = float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
     line = unrolled_line(surface, coordinates, centre if length > FACING else None)
     if line is None:
-        size = float(np.ptp(points, axis=0).max())
+        size = float(np.ptp(coordinates[surface.points], axis=0).max())
         line = UnrolledLine(centre + np.outer([-size, size], tangent), np.array([0.0, 2.0 * size]))
-    lengths = line.lengths(points)
-    if len(planes) == 1 and not line.closed:
+    lengths = line.lengths(coordinates[surface.points])
+    for first, second, _ in crossed[:1]:
+        jump = float(lengths[first] - lengths[second])
+        start = float(weight @ (lengths + jump * (points != coordinates[surface.points]).any(axis=1)))
+        start -= 0.0 if 0.0 <= start <= line.abscissa[-1] else jump
+        return ContactMiddle(line.point_at(start), replace(line, period=abs(jump)), start)
+    if len(planes) == 1 and not line.period:
         axis, on_plane = planes[0]
         ends = lengths[on_plane]  # both ends of a half ring lie on the plane
         start = float(ends[np.argmin(np.abs(ends - weight @ lengths))])

@@ -205,7 +205,7 @@ class ContactResult(NameSuggestions):
         the middle along the mean normal.
     tangent : ndarray (dim,), optional
         Direction along which half-widths are measured in 2D [-]. It is None in axisymmetry, in 3D, and on a ring in contact
-        along its entire circumference, where `place` is used instead.
+        along its entire circumference or across the ends of a period, where `place` is used instead.
     wear : ndarray (m,), optional
         Accumulated wear depth at the end of the step, with the option ``wear`` [length].
     heat_flux : ndarray (m,), optional
@@ -330,7 +330,8 @@ class ContactResult(NameSuggestions):
     @property
     def measured_from_axis(self) -> bool:
         """Whether `place` contains distances from the axis of symmetry instead of arc lengths or distances in 3D."""
-        flat = self.coordinates.shape[1] == 2 and self.tangent is None  # in plane models only rings have no tangent
+        # In plane models, only rings and contacts across periodic ends have no tangent.
+        flat = self.coordinates.shape[1] == 2 and self.tangent is None
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
 
     @property

@@ -218,6 +218,30 @@ def test_the_two_nodes_of_one_place_have_one_pressure(divisions):
     assert end.pressure[shifted][: half + 1] == pytest.approx(middle.pressure[order][half:], rel=1e-6, abs=1e-6)
     assert end.pressure[shifted][half:] == pytest.approx(middle.pressure[order][: half + 1], rel=1e-6, abs=1e-6)
     assert end.active[shifted][[0, -1]].all()
+    assert end.radius == pytest.approx(middle.radius)
+    places = [np.unique(np.abs(contact.place).round(9)) for contact in (end, middle)]
+    assert places[0] == pytest.approx(places[1])
+
+
+@pytest.mark.parametrize("begin", [(0.0, -0.5), (-0.9, -0.5), (0.0, 0.0)], ids=["edges", "beside", "corners"])
+def test_a_contact_across_the_ends_of_a_period_in_space_is_joined(begin):
+    def contact(begin):
+        mesh = fc.generate.box((1.0, 1.0, 0.5), (10, 10, 3), "hex8", (*begin, 0.0))
+        model, k = ring(mesh, "3d"), 2.0 * np.pi
+        waves = fc.obstacles.Height(lambda x: (0.002 * (np.cos(k * x).sum(axis=1) - 2.0), -0.002 * k * np.sin(k * x)))
+        model.add_obstacle("floor", secondary="ZMIN", obstacle=waves)
+        model.add_pressure("ZMAX", 0.5)
+        model.add_periodicity("XMIN", "XMAX")
+        model.add_periodicity("YMIN", "YMAX")
+        corner = int(np.linalg.norm(mesh.points - (*begin, 0.5), axis=1).argmin())
+        for axis in "xy":
+            model.relate([(corner, axis, 1.0)])
+        return fc.solve(model, 1)[-1].contact["floor"]
+
+    whole, cut = contact((-0.5, -0.5)), contact(begin)
+    assert cut.force == pytest.approx(whole.force, abs=1e-6)
+    assert cut.radius == pytest.approx(whole.radius, rel=1e-3)
+    assert cut.middle == pytest.approx(np.round(cut.middle), abs=1e-3)
 
 
 @pytest.mark.filterwarnings("ignore:.*past each other at the periodic ends", "ignore:a displacement of")
