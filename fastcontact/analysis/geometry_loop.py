@@ -134,7 +134,7 @@ def _settle(
         residual = max(residual, RESIDUAL * NOTABLE if step.state.extrapolation.ratio else NOTABLE)
         iterate.u = step.state.extrapolation.predicted(iterate.u, degree=1)
     tolerances = Tolerances(problem.solver, criteria, residual, step.state.gap_round_off, step.expected)
-    mixing, window = _Mixing(step, step.linearises_contact), ScatterWindow()
+    mixing, window, lift_size = _Mixing(step, step.linearises_contact), ScatterWindow(), largest(step.load.lift)
     for update in range(limit + 1):
         if update == 0 and paired is not None and paired.paired_at is not None:
             iterate.u[problem.contact_dofs], constraints = paired.paired_at, paired.constraints
@@ -142,7 +142,7 @@ def _settle(
             constraints = pair_surfaces(problem, step.state, step.load, iterate)
         extrapolation = step.state.extrapolation if extrapolates and update == 0 else None
         active = initially_active(constraints, iterate, extrapolation)
-        accuracy = tolerances.accuracy(largest(step.load.lift) + largest(iterate.u))
+        accuracy = tolerances.accuracy(lift_size + largest(iterate.u))
         # Constraints of several pairs, or of both ends of a period, may be at one node.
         ends = problem.model.periodic_interfaces
         nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None
@@ -160,7 +160,7 @@ def _settle(
         before = iterate.u[problem.dofs.active]
         change = largest(displacement - before)
         # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
-        size = max(step.condensed_size, largest(solution.u), largest(step.load.lift))
+        size = max(step.condensed_size, largest(solution.u), lift_size)
         relative_change = change / size if size and change > step.state.gap_round_off else 0.0
         iterate.u[problem.dofs.active] = displacement
         _store_solution(iterate, constraints, solution, relative_change)
@@ -348,14 +348,14 @@ def newton_step(
     except LinAlgError:
         return None
     contact, gaps = dofs.contact, np.zeros((1 + len(constraints.tangents), len(constraints)))
+    motion, force = np.zeros((2, len(u)))
+    nodal_motion = step.problem.displacement(motion)
 
     def response_along(v: Array) -> Array:
         """Return the active components (k,) of ``S'(u) v`` for changes v of the components on which contact depends."""
-        u, force = np.zeros((2, len(step.load.lift)))
-        u[step.problem.contact_dofs] = v
-        nodal = step.problem.displacement(u)
+        motion[step.problem.contact_dofs], force[:] = v, 0.0
         for rows, geometry in geometries:
-            forces, slips = geometry.derivatives_along(nodal)
+            forces, slips = geometry.derivatives_along(nodal_motion)
             gaps[: len(slips), rows] = slips
             force[: forces.size] += forces.ravel()
         merged = gaps if nodes is None else nodes.merged_gaps(gaps)
