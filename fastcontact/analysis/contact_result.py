@@ -15,7 +15,7 @@ from fastcontact.analysis.work import ContactForces, contact_work
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.contact_middle import ContactMiddle, contact_middle
+from fastcontact.contact.contact_middle import contact_middle
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas, nodes_with_area
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -95,8 +95,12 @@ def contact_result(
         shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
     forces, total, primary_points, primary_forces = _nodal_forces(pair, constraints, multiplier, tangential)
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
-    place, tangent = middle.distances(constraints.positions), middle.tangent
-    along_tangent = place if tangent is None else (constraints.positions - middle.position) @ tangent
+    place, tangent = middle.distances(coordinates), middle.tangent
+    distances = middle.distances(constraints.positions)
+    along_tangent = distances if tangent is None else (constraints.positions - middle.position) @ tangent
+    radius = half_width(distances, active, along_tangent)
+    if coordinates.shape[1] == 3 and closed[place.argmin()]:  # not a ring around an open middle
+        radius = _radius_in_facets(pair, place, closed, *radius)
     dry = None if pair.options.source is None else np.zeros(len(points))
     abscissa, obstacle_results = pair.secondary.abscissa, dict[str, Any]()
     if axis is not None:  # distance from the axis
@@ -121,11 +125,11 @@ def contact_result(
         normal=normal,
         active=closed,
         force=total,
-        radius=_contact_radius(pair, middle, (place, along_tangent), active, closed),
+        radius=radius,
         shear=shear,
         sticking=closed & sticking,
         middle=middle.position,
-        place=middle.distances(coordinates),
+        place=place,
         tangent=tangent,
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
@@ -134,22 +138,16 @@ def contact_result(
     )
 
 
-def _contact_radius(
-    pair: Formulation, middle: ContactMiddle, distances: tuple[Array, Array], active: Mask, closed: Mask
-) -> tuple[float, float]:
-    """Return the bounds `ContactResult.radius`.
+def _radius_in_facets(pair: Formulation, place: Array, closed: Mask, low: float, high: float) -> tuple[float, float]:
+    """Return the bounds `ContactResult.radius` in 3D, given those of the constraints, `low` and `high` [length].
 
-    `distances` are the places of the constraints relative to the middle, and their coordinates along the tangent there. In 3D
-    the radius may depend on the direction, and facets of closed nodes (n_nodes,) may be only partly in contact.
+    The radius may depend on the direction, and facets of closed nodes (n_nodes,) may be only partly in contact. `place`
+    (n_nodes,) are the distances of the nodes from the middle [length].
     """
-    low, high = half_width(distances[0], active, distances[1])
     side = pair.secondary
-    place = middle.distances(pair.points[side.points])
-    if pair.points.shape[1] == 3 and closed[place.argmin()]:  # not a ring around an open middle
-        free = ~closed & ~pair.excluded[side.points]
-        low = min(low, float(place[closed & (side.node_adjacency @ free > 0)].min(initial=np.inf)))
-        high = max(high, float(place[free & (side.node_adjacency @ closed > 0)].max(initial=0.0)))
-    return low, high
+    free = ~closed & ~pair.excluded[side.points]
+    low = min(low, float(place[closed & (side.node_adjacency @ free > 0)].min(initial=np.inf)))
+    return low, max(high, float(place[free & (side.node_adjacency @ closed > 0)].max(initial=0.0)))
 
 
 def _nodal_forces(

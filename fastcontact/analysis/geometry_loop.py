@@ -100,10 +100,7 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
     lift = step.load.lift if bodies is None else step.load.lift + bodies.rigid(u[bodies.dofs])
     condensed = problem.system.unknowns(u, lift)
     condensed[problem.dofs.unknowns] = 0.0
-    step = replace(
-        step, loaded=step.loaded.condensed(), condensed_size=largest(condensed),
-        linearises_contact=not (problem.solver.iterative or step.load.fluids),
-    )  # fmt: skip
+    step = replace(step, loaded=step.loaded.condensed(), condensed_size=largest(condensed))
     increments = FrictionIncrements(step)
     try:
         settled = _settle(step, iterate, increments, paired if step.linearises_contact else None)
@@ -121,20 +118,16 @@ def _settle(
     step: StepContext, iterate: Iterate, increments: FrictionIncrements, paired: SettledContact | None = None
 ) -> SettledContact:
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
-    problem, criteria = step.problem, step.problem.criteria
+    problem, criteria, solver = step.problem, step.problem.criteria, step.problem.solver
     limit = criteria.max_geometry_updates if problem.until_settled else criteria.geometry_updates or 0
     # From a converged iterate, the loop continues without extrapolation and with accurate solutions.
-    extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
-    # The errors of iterative solutions are about the tolerance times the contrast of cells. Smaller changes are not
-    # significant.
-    relative_error = problem.solver.tolerance * (problem.solver.contrast if problem.solver.iterative else 1.0)
-    relative_tolerance = max(criteria.geometry, relative_error)
-    residual = problem.solver.tolerance
+    extrapolates = problem.until_settled and solver.iterative and not iterate.history
+    residual = solver.tolerance
     if extrapolates:
         residual = max(residual, RESIDUAL * NOTABLE if step.state.extrapolation.ratio else NOTABLE)
         iterate.u = step.state.extrapolation.predicted(iterate.u, degree=1)
-    tolerances = Tolerances(problem.solver, criteria, residual, step.state.gap_round_off, step.expected)
-    mixing, window = _Mixing(step, step.linearises_contact), ScatterWindow()
+    tolerances = Tolerances(solver, criteria, residual, step.state.gap_round_off, step.expected)
+    mixing, window, lift_size = _Mixing(step, step.linearises_contact), ScatterWindow(), largest(step.load.lift)
     for update in range(limit + 1):
         if update == 0 and paired is not None and paired.paired_at is not None:
             iterate.u[problem.contact_dofs], constraints = paired.paired_at, paired.constraints
@@ -142,7 +135,7 @@ def _settle(
             constraints = pair_surfaces(problem, step.state, step.load, iterate)
         extrapolation = step.state.extrapolation if extrapolates and update == 0 else None
         active = initially_active(constraints, iterate, extrapolation)
-        accuracy = tolerances.accuracy(largest(step.load.lift) + largest(iterate.u))
+        accuracy = tolerances.accuracy(lift_size + largest(iterate.u))
         # Constraints of several pairs, or of both ends of a period, may be at one node.
         ends = problem.model.periodic_interfaces
         nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None
@@ -150,7 +143,7 @@ def _settle(
         closed = active if nodes is None else nodes.summed(active) > 0.0
         step_on_path = increments.with_path(step, constraints, iterate.u, nodes)
         if increments.unfinished:
-            accuracy = Accuracy(0.0, residual=problem.solver.tolerance)
+            accuracy = Accuracy(0.0, residual=solver.tolerance)
         solution, displacement = solve_inequalities(step_on_path, merged, iterate, closed & merged.usable, accuracy)
         if increments.unfinished:
             if not solution.settled:
@@ -160,7 +153,7 @@ def _settle(
         before = iterate.u[problem.dofs.active]
         change = largest(displacement - before)
         # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
-        size = max(step.condensed_size, largest(solution.u), largest(step.load.lift))
+        size = max(step.condensed_size, largest(solution.u), lift_size)
         relative_change = change / size if size and change > step.state.gap_round_off else 0.0
         iterate.u[problem.dofs.active] = displacement
         _store_solution(iterate, constraints, solution, relative_change)
@@ -171,11 +164,14 @@ def _settle(
             raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue
-        tolerance = max(relative_tolerance * size, step.state.gap_round_off)
-        is_exact = solution.settled and not accuracy.inexact
-        if not accuracy.inexact:
+        # A factorisation may have replaced an iterative solver, whose errors are about the tolerance times the contrast of
+        # cells. Smaller changes are not significant.
+        inexact, contrast = accuracy.inexact and solver.iterative, solver.contrast if solver.iterative else 1.0
+        tolerance = max(max(criteria.geometry, solver.tolerance * contrast) * size, step.state.gap_round_off)
+        if not inexact:
             increments.update(constraints, solution, change - tolerance, size, iterate.u)
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=before[problem.dofs.contact])
+        is_exact = solution.settled and not inexact
         if is_exact and change <= tolerance and not (increments.due or increments.unfinished):
             return settled
         if not (is_exact and change <= SINGLE_PRECISION * size):
@@ -186,7 +182,7 @@ def _settle(
                 "contact forces by %.1e (Criteria.geometry = %g)", *scatter.values(), problem.criteria.geometry,
             )  # fmt: skip
             return replace(settled, scatter=scatter)
-        iterate.u[problem.dofs.active] = mixing.next(settled, before, displacement, tolerance, accuracy.inexact)
+        iterate.u[problem.dofs.active] = mixing.next(settled, before, displacement, tolerance, inexact)
         tolerances.tighten(relative_change, solution.residual)
         is_slow = update >= max(limit // 2, UPDATES_BEFORE_ROUNDING) and not iterate.rounded
         if is_slow and any(pair.may_alternate(constraints.parts[name]) for name, pair in problem.pairs.items()):
@@ -348,14 +344,14 @@ def newton_step(
     except LinAlgError:
         return None
     contact, gaps = dofs.contact, np.zeros((1 + len(constraints.tangents), len(constraints)))
+    motion, force = np.zeros((2, len(u)))
+    nodal_motion = step.problem.displacement(motion)
 
     def response_along(v: Array) -> Array:
         """Return the active components (k,) of ``S'(u) v`` for changes v of the components on which contact depends."""
-        u, force = np.zeros((2, len(step.load.lift)))
-        u[step.problem.contact_dofs] = v
-        nodal = step.problem.displacement(u)
+        motion[step.problem.contact_dofs], force[:] = v, 0.0
         for rows, geometry in geometries:
-            forces, slips = geometry.derivatives_along(nodal)
+            forces, slips = geometry.derivatives_along(nodal_motion)
             gaps[: len(slips), rows] = slips
             force[: forces.size] += forces.ravel()
         merged = gaps if nodes is None else nodes.merged_gaps(gaps)

@@ -135,8 +135,6 @@ class StepContext:
         Number of the step.
     condensed_size : float
         Largest absolute value of the unknowns that are condensed, at the beginning of the step [length].
-    linearises_contact : bool
-        Whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure.
     path : LoadPath or LastIncrement, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
@@ -149,8 +147,12 @@ class StepContext:
     expected: float = 0.0
     index: int = 0
     condensed_size: float = 0.0
-    linearises_contact: bool = False
     path: LoadPath | LastIncrement | None = None
+
+    @property
+    def linearises_contact(self) -> bool:
+        """Whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure."""
+        return not (self.problem.solver.iterative or self.load.fluids)
 
     def imposed_slips(self, constraints: Constraints) -> Array:
         """Return the slips that supports and obstacles impose in the step.

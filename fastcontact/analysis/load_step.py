@@ -221,6 +221,8 @@ def _contact_at_end(
         contact, slip = results[name], np.zeros_like(results[name].coordinates)
         if contact.active.any():
             touched.add(name)
+        elif name not in touched:
+            first_contact.pop(name, None)
         if contact.active.any() and pair.options.kind != "tied":
             rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
             slip = pair.nodal_slip(configuration)
@@ -247,8 +249,7 @@ def _contact_at_end(
     end = replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         last_change=settled.last_change, never_opening=never_opening, elastic_slip=elastic_slip, bonds=bonds, worn=worn,
-        wear={}, slipped=slipped, forces=forces, touched=frozenset(touched),
-        first_contact={name: positions for name, positions in first_contact.items() if name in touched},
+        wear={}, slipped=slipped, forces=forces, touched=frozenset(touched), first_contact=first_contact,
         work=start.work and start.work.after(energy, stored, work_increments.tolist(), released, work_on_wear),
     )  # fmt: skip
     return end, results

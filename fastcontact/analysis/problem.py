@@ -205,8 +205,8 @@ class Problem:
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         lift = self.system.lift(prescribed.ravel(), self.factors(self.model.relations, instant))
         pairs, factor = self.model.contact, partial(multiplier, ramp=self.ramp, instant=instant)
-        sides = [(pair, self.pairs[pair.name].primary) for pair in pairs]
-        obstacles = {p.name: factor(p.ramp) * side.motion for p, side in sides if isinstance(side, RigidSide)}
+        sides = {name: pair.primary for name, pair in self.pairs.items()}
+        obstacles = {p.name: factor(p.ramp) * s.motion for p in pairs if isinstance(s := sides[p.name], RigidSide)}
         clearances = {p.name: factor(p.clearance_ramp) for p in pairs if p.clearance_ramp is not None}
         angles = {p.name: angle_at(p, self.ramp, instant) for p in pairs if p.rotation is not None}
         friction = {p.name: factor(p.friction_ramp) for p in pairs if p.friction_ramp is not None}
