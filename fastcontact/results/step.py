@@ -449,6 +449,7 @@ class StepResult(NameSuggestions):
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``, ``spin_factors``: multipliers of the
           temperatures, of the initial stresses and strains, of the pressures and of the centrifugal forces [-].
         - ``work``, ``pretension`` and ``reference_reactions``: data of the properties of the same names.
+        - ``thickness``, in plane decks: thickness to which the forces of the step refer [length].
         - ``parameter``, in vibration modes, whose shapes have no unit: quantity that the load factor represents,
           ``frequency`` or ``phase``.
     warnings : tuple of str
