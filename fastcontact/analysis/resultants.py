@@ -400,7 +400,8 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     supported, _ = model.prescribed()
     relations = [relation for _, relation in model.related_supports]
     relations += [relation for relation in model.relations if not any(relation is support for support in relations)]
-    reaction, forces = _support_forces(model, relations, supported, step.reaction, step.displacement)
+    thickness = _thickness(step)
+    reaction, forces = _support_forces(model, relations, supported, step.reaction / thickness, step.displacement)
     resultants: dict[str, Array] = {}
     unassigned = np.where(supported, reaction, 0.0)
     for support in model.supports:
@@ -410,7 +411,12 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     for (group, relation), force in zip(model.related_supports, forces, strict=False):
         resultant = (relation.rows.T @ force).reshape(supported.shape).sum(axis=0)
         resultants[group] = resultants.get(group, 0.0) + resultant
-    return resultants
+    return {group: thickness * resultant for group, resultant in resultants.items()}
+
+
+def _thickness(step: StepResult) -> float:
+    """Return the thickness [length] that the forces of a step of a plane deck refer to; 1 for other steps."""
+    return float(step.iterations.get("thickness", 1.0))
 
 
 def reference_reactions(
@@ -490,7 +496,7 @@ def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
     _check(model, step)
     forces: dict[str, Array] = {}
     for spring in model.springs:
-        name, tension = spring.name.removeprefix("the "), spring.tension(step.displacement)
+        name, tension = spring.name.removeprefix("the "), _thickness(step) * spring.tension(step.displacement)
         forces[name] = np.concatenate([forces[name], tension]) if name in forces else tension
     return forces
 

@@ -15,6 +15,7 @@ from scipy.sparse import csr_array
 from fastcontact._tools.records import replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.equilibrium import StepEquilibrium
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Heat, Temperatures
@@ -94,10 +95,12 @@ def settle_heat(
             return replace(temperatures, balance={**temperatures.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, temperatures.rise)
         equilibrium = solve(thermal_load(problem, load, rise), equilibrium)
+    relative = change / largest(temperatures.rise)
+    accepted = f", or accept this accuracy with Criteria(geometry={2 * relative:.0e})" if relative < NOTABLE else ""
     raise ConvergenceError(
         f"heat and contact do not converge: after {limit} exchanges, temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
-        "conductance fall gradually with the gap, or grow from zero with the pressure",
+        f"conductance fall gradually with the gap, or grow from zero with the pressure{accepted}",
         [] if equilibrium.settled is None else equilibrium.settled.iterate.history,
     )
 

@@ -229,7 +229,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         texts.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
     if heat := summary.get("heat"):
         powers = ", ".join(f"{name} {heat[name]:.4g}" for name in ("loads", "films", "friction"))
-        supports = f"prescribed temperatures {heat['inflow']:.6g} in, {heat['inflow'] - heat['supports']:.6g} out"
+        supports = f"prescribed temperatures {heat['entering']:.6g} in, {heat['entering'] - heat['supports']:.6g} out"
         contacts = "".join(f"; across '{name}' {power:.6g}" for name, power in heat["contacts"].items())
         temperatures = "temperatures from {:.6g} to {:.6g}".format(*heat["temperature"])
         texts.append(f"  {temperatures}; heat into the bodies by {supports}, {powers}{contacts}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,7 +33,8 @@ class Tabulated:
     Parameters
     ----------
     along : {"x", "y", "z", "radius"}
-        Name of the coordinate; ``"radius"`` is the distance from the z axis in 3D, and from the origin in 2D.
+        Name of the coordinate; ``"radius"`` is the distance from the z axis in 3D, and from the origin in plane models. In
+        axisymmetry, where the radius is x, it is refused.
     table : sequence of (float, float)
         Coordinate [length] and value [unit of the quantity] of each point of the table.
 
@@ -73,6 +75,19 @@ class Tabulated:
         else:
             raise ModelError("a table is along z, but the mesh is plane: use x, y or radius")
         return np.interp(coordinate, *np.transpose(self.table))
+
+
+def is_along_radius(value: Any) -> bool:
+    """Return whether a value, or one that it contains, is a table along ``"radius"``."""
+    if isinstance(value, Tabulated):
+        return value.along == "radius"
+    if isinstance(value, Varying):
+        return is_along_radius(value.source)
+    if isinstance(value, Mapping):
+        return any(map(is_along_radius, value.values()))
+    if isinstance(value, list | tuple):
+        return any(map(is_along_radius, value))
+    return dataclasses.is_dataclass(value) and any(map(is_along_radius, vars(value).values()))
 
 
 def _number(value: Any) -> float:

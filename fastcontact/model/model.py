@@ -14,6 +14,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
+from fastcontact.elasticity.varying_constants import is_along_radius
 from fastcontact.errors import ModelError
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.model import rigid_motions
@@ -147,6 +148,10 @@ class Model(ModelSupports, metaclass=_PublicNames):
         fastcontact.errors.ModelError: 1 rigid-body motion is not supported: body 'BLOCK': translation along x. ...
         """
         self.material_numbers()
+        items: list[Any] = [*self.supports, *self.loads, *self.relations]
+        items += [*self.temperatures, *self.initial_states, *self.heat_loads]
+        if self.kinematics == "axisymmetric" and is_along_radius([*items, *self.materials, *self.contact]):
+            raise ModelError("in axisymmetry the radius is x: use tables along x instead of radius")
         if self.initial_states:
             self.refuse_nonlinear("initial stresses and strains are")
         fixed, prescribed = self.prescribed_by_ramp()
@@ -155,8 +160,6 @@ class Model(ModelSupports, metaclass=_PublicNames):
         self.thermal_forces_by_ramp()
         self._check_each_temporary_set(self._check_heat_of)
         if ramp is not None:
-            items: list[Any] = [*self.supports, *self.loads, *self.relations]
-            items += [*self.temperatures, *self.initial_states, *self.heat_loads]
             ramps = [(item.name, item.ramp) for item in items]
             ramps += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             ramps += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]

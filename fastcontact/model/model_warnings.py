@@ -130,7 +130,9 @@ def _proportions(model: Model, motion: float) -> Iterator[str]:
             "mesh and displacement in the same unit?"
         )
     forces = [_peak(ramp) * np.abs(force).sum() for ramp, force in model.forces_by_ramp().items()]
-    depth = 1.0 if model.mesh.dim == 2 and model.kinematics != "axisymmetric" else size
+    depth = size if model.mesh.dim == 3 else 1.0
+    if model.kinematics == "axisymmetric":
+        depth = 2.0 * np.pi * float(model.mesh.points[:, 0].mean())
     stiffness = min(material.young[0] for material, _ in model.materials) * size * depth
     strain = max(forces, default=0.0) / stiffness
     if strain > PLAUSIBLE_STRAIN[1] or 0.0 < strain < PLAUSIBLE_STRAIN[0]:

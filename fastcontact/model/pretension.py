@@ -106,7 +106,7 @@ class PretensionForce(Load):
         return f"the force of {self.section.name}"
 
     @property
-    def places(self) -> tuple[str, ...]:
+    def group_names(self) -> tuple[str, ...]:
         """No groups, since the force acts between two sides."""
         return ()
 

@@ -174,7 +174,8 @@ class ContactResult(NameSuggestions):
     radius : (float, float)
         Lower and upper bound of the contact radius, in 2D of the half-width along the `tangent` [length]; NaN without
         contact. They are the distances from the `middle` to the outermost closed node and to the first open node beyond it,
-        in finite strain in the deformed configuration. In 3D, pairs of a closed and an open node with a common facet are
+        in finite strain in the deformed configuration. With `continuous` contact, integration points take the place of
+        nodes. In 3D, pairs of a closed and an open node with a common facet are
         considered; the lower bound is the smallest distance of their closed nodes and the upper bound the largest distance of
         their open nodes, so that all semi-axes of an elliptic contact lie between the bounds. If the contact is a ring around
         an open middle, the bounds refer to its outer edge. The upper bound is infinite if the side is closed up to its edge.
@@ -448,6 +449,7 @@ class StepResult(NameSuggestions):
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``, ``spin_factors``: multipliers of the
           temperatures, of the initial stresses and strains, of the pressures and of the centrifugal forces [-].
         - ``work``, ``pretension`` and ``reference_reactions``: data of the properties of the same names.
+        - ``thickness``, in plane decks: thickness to which the forces of the step refer [length].
         - ``parameter``, in vibration modes, whose shapes have no unit: quantity that the load factor represents,
           ``frequency`` or ``phase``.
     warnings : tuple of str

@@ -462,11 +462,12 @@ CASE = "reference_temperature = 20.0\n" + case_of(
 )  # fmt: skip
 
 
-def test_case_files_have_heat(tmp_path):
+def test_case_files_have_heat(tmp_path, capsys):
     from fastcontact.cli import main
 
     (tmp_path / "bars.toml").write_text(CASE, encoding="utf-8")
-    assert main(["run", str(tmp_path / "bars.toml"), "-o", str(tmp_path / "b.vtkhdf"), "--strict", "-q"]) == 0
+    assert main(["run", str(tmp_path / "bars.toml"), "-o", str(tmp_path / "b.vtkhdf"), "--strict"]) == 0
+    assert "heat into the bodies by prescribed temperatures" in capsys.readouterr().out
     with fc.open_results(tmp_path / "b.vtkhdf") as steps:
         assert steps[-1].heat["contacts"]["joint"] == pytest.approx(625.0, rel=1e-6)
 

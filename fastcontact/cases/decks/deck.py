@@ -179,7 +179,10 @@ class Deck:
             for name, contact in step.contact.items()
         }
         sums = [name for name in ("work", "heat") if step.iterations.get(name)]
-        iterations |= {name: _scaled(thickness, step.iterations[name]) for name in sums}
+        iterations |= {name: _scaled(thickness, step.iterations[name]) for name in sums} | {"thickness": thickness}
+        if step.pretension:
+            sections = step.pretension.items()
+            iterations["pretension"] = {name: {**s, "force": thickness * s["force"]} for name, s in sections}
         heat = None if step.heat_reaction is None else thickness * step.heat_reaction
         reaction = thickness * reaction
         return replace(step, reaction=reaction, contact=contacts, iterations=iterations, heat_reaction=heat)

@@ -308,14 +308,14 @@ def test_pretension(given):
     )
     mesh = fc.generate.cut(mesh, "CUT")
 
-    def make(E=1000.0, pulled=1.0):
+    def make(E=1000.0, pulled=1.0, pushed=1.0):
         model = elastic_model(mesh, "plane_stress", E=E, BOTTOM="xy", TOP="xy")
         model.add_pretension("bolt", "CUT", **{given: {"force": 3.0, "shortening": 0.01}[given] * pulled})
+        model.add_pressure("RIGHT", pushed)
         return model
 
-    compare(
-        make, [("reaction", "TOP", "y")], {"E": (("E", 0), 1000.0, 1.0), "pulled": (("pretension", "bolt"), 1.0, 0.1)}
-    )
+    changes = {"E": (("E", 0), 1000.0, 1.0), "pulled": (("pretension", "bolt"), 1.0, 0.1)}
+    compare(make, [("reaction", "TOP", "y")], changes | {"pushed": (("load", "RIGHT"), 1.0, 0.1)})
 
 
 def asked(model: fc.Model, quantity=("pressure_max", "c"), parameters=(("E", 0),), criteria=TIGHT, **options):

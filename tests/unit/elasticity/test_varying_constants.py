@@ -345,6 +345,14 @@ def test_a_table_is_straight_between_its_places_and_constant_beyond():
     np.testing.assert_allclose(table(np.array([[0.0, 0.5], [1.2, 1.6], [3.0, 4.0]])), [10.0, 20.0, 30.0])
     assert fc.Tabulated("z", [(0, 1), (1, 2)])(np.array([[9.0, 9.0, 0.5]])) == 1.5
     refused(fc.ModelError, "the mesh is plane", fc.Tabulated("z", [(0, 1)]), np.zeros((1, 2)))
+    radial = fc.Tabulated("radius", [(1.0, 10.0), (3.0, 30.0)])
+    for number in range(3):
+        model = elastic_model(fc.generate.block(), "axisymmetric", E=radial if number == 0 else 1000.0, BOTTOM="y")
+        if number == 1:
+            model.add_temperature(radial)
+        if number == 2:
+            model.add_pressure("TOP", radial)
+        refused(fc.ModelError, "in axisymmetry the radius is x", model.check)
     for arguments, words in (
         (("r", [(0, 1)]), "along x, y, z or radius, not along 'r'"),
         (("x", [(0, 1), (0, 2)]), "must have ascending coordinates"),

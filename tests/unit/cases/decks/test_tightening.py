@@ -112,3 +112,57 @@ def test_what_a_tie_does_not_do_is_noted(tmp_path):
         deck_of(tmp_path, WHOLE.replace(CONTACT, tie.replace("0.1", "-1.")))
     with pytest.raises(fc.CaseError, match="ADJUST=MAYBE is not supported"):
         deck_of(tmp_path, WHOLE.replace(CONTACT, tie.replace("YES", "maybe")))
+
+
+PLANE_BAR = """*Node
+1, 0., 0.
+2, 1., 0.
+3, 0., 1.
+4, 1., 1.
+5, 0., 2.
+6, 1., 2.
+7, 0., 5.
+9, 3., 9.
+*Element, type=CPS4, elset=bar
+1, 1, 2, 4, 3
+2, 3, 4, 6, 5
+*Element, type=SPRINGA, elset=spring
+3, 5, 7
+*Spring, elset=spring
+
+40.
+*Surface, name=cut
+1, S3
+*Material, name=steel
+*Elastic
+1000., 0.
+*Solid Section, elset=bar, material=steel
+5.
+*Pre-tension Section, surface=cut, node=9
+0., 1.
+*Boundary
+1, 1, 2
+2, 2, 2
+3, 1, 1
+5, 1, 1
+7, 1, 2
+*Step
+*Static
+*Cload
+9, 1, 10.
+*End Step
+"""
+
+
+def test_forces_of_a_thick_plane_model(tmp_path):
+    """The spring, the support at its end and the bolt are in series."""
+    deck = deck_of(tmp_path, PLANE_BAR)
+    (step,) = deck.solve()
+    assert step.pretension["cut"]["force"] == pytest.approx(10.0, rel=1e-9)
+    (tension,) = next(iter(fc.spring_forces(deck.model, step).values()))
+    assert tension == pytest.approx(10.0, rel=1e-9)
+    assert step.reaction[deck.point(7), 1] == pytest.approx(10.0, rel=1e-9)
+    (of_unit_thickness,) = fc.solve(deck.model, deck.ramp, criteria=deck.criteria)
+    expected = fc.support_forces(deck.model, of_unit_thickness)
+    for group, force in fc.support_forces(deck.model, step).items():
+        assert force == pytest.approx(5.0 * expected[group], rel=1e-9, abs=1e-9)
