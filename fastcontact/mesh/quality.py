@@ -216,7 +216,8 @@ def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
 def extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
     """Return the area or volume, the smallest and the largest Jacobian, and the longest edge of each cell (n_cells,).
 
-    Jacobians are those at the quadrature points, and edges are treated as straight.
+    The first three are in units of length^2, in 3D length^3. Jacobians are those at the quadrature points, and edges [length]
+    are treated as straight.
     """
     element, x = elements.get(name), mesh.points[mesh.cells[name]]
     _, gradients, weights = element.tables
