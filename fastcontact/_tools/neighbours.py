@@ -35,14 +35,8 @@ def nearest(points: Array, positions: Array) -> tuple[Array, Indices]:
 
 def close_pairs(points: Array, max_distance: float) -> Indices:
     """Return the pairs of rows (k, 2) of `points` (n, dim) [length] whose distance is at most `max_distance` [length]."""
-    projection = points @ DIRECTION[: points.shape[1]]
-    order = np.argsort(projection)
-    is_close = np.diff(projection[order]) <= max_distance
-    if not is_close.any():
-        return np.empty((0, 2), np.intp)
-    rows = np.sort(order[np.append(is_close, False) | np.insert(is_close, 0, False)])
-    second, first = pairs_within(points[rows], points[rows], np.full(len(rows), max_distance))
-    pairs = rows[np.column_stack([first, second])[first < second]]
+    second, first = pairs_within(points, points, np.full(len(points), max_distance))
+    pairs = np.column_stack([first, second])[first < second]
     return pairs[np.lexsort(pairs.T[::-1])]
 
 

@@ -223,15 +223,7 @@ class Mesh(NameSuggestions):
             return self.point_groups[group]
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group", group, self.group_names))
-        if group not in self._nodes_of_groups:
-            blocks = [block.ravel() for block in self.cells_of(group).values()]
-            self._nodes_of_groups[group] = np.unique(np.concatenate(blocks)) if blocks else np.empty(0, np.int32)
-        return self._nodes_of_groups[group].copy()
-
-    @cached_property
-    def _nodes_of_groups(self) -> dict[str, AnyArray]:
-        """Point numbers of the cell groups for which `points_of` has computed them."""
-        return {}
+        return np.unique(np.concatenate([np.empty(0, np.int32), *(b.ravel() for b in self.cells_of(group).values())]))
 
     def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
         """Return the message for an unknown group; `known` contains the names of all groups of this kind."""

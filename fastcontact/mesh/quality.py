@@ -11,6 +11,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import equal_rows
 
 # Jacobians below this fraction of the square, in 3D of the cube, of the longest edge are attributed to round-off.
 _ROUND_OFF = 1e-12
@@ -165,18 +166,14 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
 
 def _check_duplicates(mesh: Mesh, name: str) -> None:
     """Raise MeshError if two cells of one element type have the same nodes, so that their stiffness counts twice."""
-    nodes = mesh.cells[name].astype(np.int64)
-    # Most cells are distinguished by sums over their nodes. Only cells with equal sums are compared node by node.
-    key = nodes.sum(axis=1) * mesh.n_points + (nodes * nodes % 1_000_003).sum(axis=1)
-    order = np.argsort(key, kind="stable")
-    equal = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-    rows = np.unique(np.concatenate([order[equal], order[equal + 1]]))
-    _, first, count = np.unique(np.sort(nodes[rows], axis=1), axis=0, return_index=True, return_counts=True)
-    if (count > 1).any():
-        row = int(rows[first[count > 1].min()])
+    nodes = np.sort(mesh.cells[name], axis=1)
+    rows = np.unique(equal_rows(nodes))
+    _, first, count = np.unique(nodes[rows], axis=0, return_index=True, return_counts=True)
+    if len(rows):
+        row = int(rows[first.min()])
         raise MeshError(
             f"{_cell_text(mesh, name, row)} occurs in the mesh {int(count.max())} times (number of such cells: "
-            f"{int((count > 1).sum())}): remove the copies"
+            f"{len(count)}): remove the copies"
         )
 
 
@@ -216,7 +213,8 @@ def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
 def extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
     """Return the area or volume, the smallest and the largest Jacobian, and the longest edge of each cell (n_cells,).
 
-    Jacobians are those at the quadrature points, and edges are treated as straight.
+    The first three are in units of length^2, in 3D length^3. Jacobians are those at the quadrature points, and edges [length]
+    are treated as straight.
     """
     element, x = elements.get(name), mesh.points[mesh.cells[name]]
     _, gradients, weights = element.tables

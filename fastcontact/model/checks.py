@@ -55,7 +55,7 @@ def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
 
     Points with multi-point constraints or springs, which the mask `related` (n_points,) marks, are exempt.
     """
-    isolated = np.flatnonzero(forces.any(axis=1) & ~_connected_points(mesh, related))
+    isolated = np.flatnonzero(forces.any(axis=1) & ~related & (bodies(mesh)[1] < 0))
     if len(isolated):
         raise ModelError(
             f"{name} acts on points that belong to no solid cell (number: {len(isolated)}, first: point {isolated[0]}): "
@@ -63,20 +63,12 @@ def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
         )
 
 
-def _connected_points(mesh: Mesh, related: Mask) -> Mask:
-    """Return the mask (n_points,) of the points that belong to a solid cell or to a constraint."""
-    connected = related.copy()
-    for block in mesh.solids.values():
-        connected[block] = True
-    return connected
-
-
 def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mask) -> None:
     """Raise ModelError if no point of one of the supports (name, group) belongs to a solid cell.
 
     Points with multi-point constraints or springs, which the mask `related` (n_points,) marks, are exempt.
     """
-    connected = _connected_points(mesh, related)
+    connected = related | (bodies(mesh)[1] >= 0)
     for name, group in supports:
         points = mesh.points_of(group)
         if not connected[points].any():

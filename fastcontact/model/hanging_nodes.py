@@ -37,7 +37,7 @@ class OuterFacets:
 
     `nodes` (n, k) are padded with -1, and `corners` (n, 2 or 4) with the last corner of triangles. `normal` (n, dim) is the
     outward unit normal between the corners, `size` (n,) the diagonal of the bounding box of the corners [length], and `cell`
-    (n,) the solid cell of a facet. `pieces` (p, dim) are the nodes of the lines or triangles, and `facet` (p,) their facets.
+    (n,) the solid cell of a facet. `pieces` (n, p, dim) are the nodes of the lines or triangles, some of which are repeated.
     """
 
     nodes: Numbers
@@ -46,7 +46,6 @@ class OuterFacets:
     size: Array
     cell: Numbers
     pieces: Numbers
-    facet: Indices
 
 
 def hanging_nodes_warning(model: Model) -> str:
@@ -84,35 +83,36 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     for column in outer.nodes.T:
         np.add.at(outward, column[column >= 0], outer.normal[column >= 0])
     length = np.linalg.norm(outward, axis=1)
-    nodes, corners = np.flatnonzero(length > 0.0), mesh.points[outer.pieces]
-    centre, reach = corners.mean(axis=1), 2.0 * ON_ARC * outer.size[outer.facet]
-    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1) + reach
-    index, piece = pairs_within(mesh.points[nodes], centre, radius)
-    node, facet = nodes[index], outer.facet[piece]
+    nodes, corners = np.flatnonzero(length > 0.0), mesh.points[outer.corners]
+    centre = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1) + 2.0 * ON_ARC * outer.size
+    index, facet = pairs_within(mesh.points[nodes], centre, radius)
+    node = nodes[index]
     is_candidate = np.einsum("md,md->m", outer.normal[facet], outward[node]) <= -0.5 * length[node]
     is_candidate &= (body[node] == body[outer.corners[facet, 0]]) & (outer.nodes[facet] != node[:, None]).all(axis=1)
-    node, piece = node[is_candidate], piece[is_candidate]
-    facet = outer.facet[piece]
-    inside, height = _projections(mesh.points[node], corners[piece])
-    height /= outer.size[facet]
-    rows = np.flatnonzero(inside & (height <= ON_ARC) & _apart_from_nodes(mesh, node, outer, facet))
-    rows = rows[np.lexsort((height[rows], facet[rows], node[rows]))]
-    rows = rows[np.unique(np.stack([node, facet])[:, rows], axis=1, return_index=True)[1]]
+    node, facet = node[is_candidate], facet[is_candidate]
+    height = _distances(mesh.points[node], mesh.points[outer.pieces[facet]]) / outer.size[facet]
+    rows = np.flatnonzero((height <= ON_ARC) & _apart_from_nodes(mesh, node, outer, facet))
+    rows = rows[np.lexsort((facet[rows], node[rows]))]
     node, facet, hanging = node[rows], facet[rows], height[rows] <= NEAR
     hanging[~hanging] = _closed_at_corners(outer, facet[~hanging])
     hanging &= ~_share_cells(mesh, node, outer, facet)
     return node[hanging], facet[hanging], outer
 
 
-def _projections(points: Array, x: Array) -> tuple[Mask, Array]:
-    """Return whether points (m, dim) project into lines or triangles x (m, dim, dim), within NEAR, and their distances."""
-    sides, arm = x[:, 1:] - x[:, :1], points - x[:, 0]
-    metric = np.einsum("mid,mjd->mij", sides, sides)
+def _distances(points: Array, x: Array) -> Array:
+    """Return the distance (m,) [length] of `points` (m, dim) from the nearest of p lines or triangles `x` (m, p, dim, dim).
+
+    Only lines and triangles into which a point projects, within NEAR, are considered; without any the distance is infinite.
+    """
+    sides, arm = x[:, :, 1:] - x[:, :, :1], points[:, None] - x[:, :, 0]
+    metric = np.einsum("mpid,mpjd->mpij", sides, sides)
     degenerate = np.linalg.det(metric) <= 0.0
-    metric[degenerate] = np.eye(metric.shape[1])
-    coordinate = np.linalg.solve(metric, np.einsum("mid,md->mi", sides, arm)[..., None])[..., 0]
-    inside = (coordinate >= -NEAR).all(axis=1) & (coordinate.sum(axis=1) <= 1.0 + NEAR) & ~degenerate
-    return inside, np.linalg.norm(arm - np.einsum("mi,mid->md", coordinate, sides), axis=1)
+    metric[degenerate] = np.eye(metric.shape[2])
+    coordinate = np.linalg.solve(metric, np.einsum("mpid,mpd->mpi", sides, arm)[..., None])[..., 0]
+    inside = (coordinate >= -NEAR).all(axis=2) & (coordinate.sum(axis=2) <= 1.0 + NEAR) & ~degenerate
+    distance = np.linalg.norm(arm - np.einsum("mpi,mpid->mpd", coordinate, sides), axis=2)
+    return np.asarray(np.where(inside, distance, np.inf).min(axis=1))
 
 
 def _apart_from_nodes(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
@@ -164,21 +164,19 @@ def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
 
 def _outer_facets(mesh: Mesh) -> OuterFacets:
     """Return the outer facets of all bodies."""
-    facets, n_corners, first = outer_facets(mesh), 2 if mesh.dim == 2 else 4, 0
+    facets, n_corners = outer_facets(mesh), 2 if mesh.dim == 2 else 4
     width = max(block.shape[1] for block in facets.values())
-    nodes, corners, pieces, numbers = [], [], [], []
+    n_pieces = max(len(flat_pieces(block.shape[1], mesh.dim)) for block in facets.values())
+    nodes, corners, pieces = [], [], []
     for name, block in facets.items():
         nodes.append(np.pad(block, ((0, 0), (0, width - block.shape[1])), constant_values=-1))
         corners.append(block[:, np.minimum(np.arange(n_corners), elements.get(name).n_corners - 1)])
         local = flat_pieces(block.shape[1], mesh.dim)
-        pieces.append(block[:, local].reshape(-1, mesh.dim))
-        numbers.append(first + np.repeat(np.arange(len(block)), len(local)))
-        first += len(block)
+        pieces.append(block[:, local[np.minimum(np.arange(n_pieces), len(local) - 1)]])
     corner = np.concatenate(corners)
     x = mesh.points[corner]
     normal = flat_area_vectors(x)
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
     size, cell = np.linalg.norm(np.ptp(x, axis=1), axis=1), np.concatenate([*cells_of_outer_facets(mesh).values()])
-    flat = np.concatenate(pieces), np.concatenate(numbers)
-    return OuterFacets(np.concatenate(nodes), corner, normal, size, cell, *flat)
+    return OuterFacets(np.concatenate(nodes), corner, normal, size, cell, np.concatenate(pieces))

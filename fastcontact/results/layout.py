@@ -108,13 +108,6 @@ CELL_STRESS = "stress_in_cell"
 CELL_VON_MISES = "von_mises_in_cell"
 MATERIAL_FIELDS = {CELL_STRESS: 6, CELL_VON_MISES: 1}
 
-# Element codes of the XDMF format by VTK cell type. XDMF readers use the node order of VTK for these elements.
-XDMF_TYPES = {
-    **{5: 0x4, 9: 0x5, 22: 0x24, 23: 0x25, 28: 0x23},  # triangles and quadrangles
-    **{10: 0x6, 14: 0x7, 13: 0x8, 12: 0x9},  # tet4, pyramid5, wedge6, hex8
-    **{24: 0x26, 27: 0x27, 26: 0x28, 32: 0x29, 25: 0x30, 29: 0x32},  # tet10, pyramid13, wedge15, wedge18, hex20, hex27
-}
-
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
 # Columns that contain the first row and the number of rows of the secondary and of the primary nodes of a pair at a step.
@@ -208,12 +201,13 @@ def solid_cells(mesh: Mesh) -> SolidCells:
 
 
 def xdmf_topology(mesh: Mesh) -> Numbers | None:
-    """Return, in sequence, the XDMF code and the nodes of each solid cell, or None if XDMF does not support an element."""
-    codes = [XDMF_TYPES.get(elements.get(name).vtk) for name in mesh.solids]
-    supported = [code for code in codes if code is not None]
-    if not codes or len(supported) < len(codes):
+    """Return, in sequence, the XDMF code and the nodes of each solid cell, or None if there are no solid cells.
+
+    XDMF readers use the node order of VTK.
+    """
+    if not mesh.solids:
         return None
-    blocks = [np.insert(block, 0, code, axis=1).ravel() for code, block in zip(supported, mesh.solids.values())]
+    blocks = [np.insert(block, 0, elements.get(name).xdmf, axis=1).ravel() for name, block in mesh.solids.items()]
     return np.concatenate(blocks).astype(np.int32)
 
 

@@ -35,8 +35,8 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     Raises
     ------
     FileError
-        If the results cannot be read or contain no step, if XDMF does not support an element or the name of the result file,
-        or if the XDMF file cannot be written.
+        If the results cannot be read or contain no step, if the mesh has no solid cells, if XDMF does not support the name of
+        the result file, or if the XDMF file cannot be written.
     """
     target = checked_target(xdmf_path)
     with open_results(result_path) as results:
@@ -45,8 +45,9 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
         raise FileError(f"'{result_path}' contains no complete step yet: export it after the first one")
     topology = layout.xdmf_topology(mesh)
     if topology is None:
-        names = ", ".join(mesh.solids) or "no solid cells"
-        raise FileError(f"XDMF cannot show '{result_path}' with {names}: open the .vtkhdf file itself (ParaView 5.12)")
+        raise FileError(
+            f"XDMF cannot show '{result_path}' with no solid cells: open the .vtkhdf file itself (ParaView 5.12)"
+        )
     reference = os.path.relpath(os.path.realpath(os.fspath(result_path)), target.parent)
     if ":" in reference or not reference.isascii():
         raise FileError(f"XDMF readers cannot open '{reference}': use a name in ASCII without colons")

@@ -46,8 +46,8 @@ class Element:
         Default quadrature points and weights of the stiffness [-].
     meshio, med : str
         Name in meshio, and three-letter code in MED.
-    vtk : int
-        Cell type in VTK.
+    vtk, xdmf : int
+        Cell types in VTK and XDMF; XDMF has no fixed type for lines.
     quadratic : str
         Name of the serendipity element with the same corners; for a quadratic element, its own name.
     dilatation : int, optional
@@ -69,6 +69,7 @@ class Element:
     quadratic: str
     dilatation: int | None = None
     corner_element: Element | None = None
+    xdmf: int = 0
 
     def gradient(self, xi: Array) -> Array:
         """Return the derivatives (m, n_nodes, dim) [-] of the shape functions at `xi` (m, dim) [-].
@@ -147,7 +148,8 @@ class Element:
 def quadratic(name: str, linear: Element, functions: Functions, **arguments: Any) -> Element:
     """Return a quadratic element, whose facets are those of the `linear` element with their mid-side and centre nodes.
 
-    `functions` are its nodes (n_nodes, dim) [-] and its shape functions, and `arguments` are further arguments of `Element`.
+    `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions, and `arguments` are further arguments of
+    `Element`.
     """
     nodes, shape = functions
     facets = []

@@ -20,13 +20,14 @@ HEX8 = Element(
     "hex8", NODES,
     edges=((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)),
     facets=((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)), shape=shape,
-    quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12, quadratic="hex20", dilatation=0,
+    quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12, xdmf=0x9, quadratic="hex20", dilatation=0,
 )  # fmt: skip
 HEX20 = quadratic(
-    "hex20", HEX8, serendipity(HEX8), quadrature=gauss_cube(3), meshio="hexahedron20", med="H20", vtk=25, dilatation=1
-)
+    "hex20", HEX8, serendipity(HEX8), quadrature=gauss_cube(3), meshio="hexahedron20", med="H20", vtk=25, xdmf=0x30,
+    dilatation=1,
+)  # fmt: skip
 HEX27 = quadratic(
     "hex27", HEX8, product(np.vstack([HEX20.nodes, CENTRES]), QUAD9, LINE3), quadrature=gauss_cube(3),
-    meshio="hexahedron27", med="H27", vtk=29, dilatation=1,
+    meshio="hexahedron27", med="H27", vtk=29, xdmf=0x32, dilatation=1,
 )  # fmt: skip
 ELEMENTS = HEX20, HEX27, HEX8

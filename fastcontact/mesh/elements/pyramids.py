@@ -34,7 +34,7 @@ def shape(xi: AnyArray) -> AnyArray:
 PYRAMID5 = Element(
     "pyramid5", np.vstack([np.column_stack([QUAD4.nodes, np.zeros(4)]), [[0.0, 0.0, 1.0]]]),
     edges=(*EDGES, (0, 4), (1, 4), (2, 4), (3, 4)), facets=((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
-    shape=shape, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, quadratic="pyramid13", dilatation=0,
+    shape=shape, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, xdmf=0x7, quadratic="pyramid13", dilatation=0,
 )  # fmt: skip
 # The edges of the base are parallel to x at y = -1, to y at x = 1, to x at y = 1 and to y at x = -1.
 SIDES = np.array([-1.0, 1.0, 1.0, -1.0])
@@ -51,6 +51,6 @@ def shape_13(xi: AnyArray) -> AnyArray:
 
 PYRAMID13 = quadratic(
     "pyramid13", PYRAMID5, (with_midpoints(PYRAMID5), shape_13), quadrature=conical_pyramid(3),
-    meshio="pyramid13", med="P13", vtk=27, dilatation=0,
+    meshio="pyramid13", med="P13", vtk=27, xdmf=0x27, dilatation=0,
 )  # fmt: skip
 ELEMENTS = PYRAMID13, PYRAMID5

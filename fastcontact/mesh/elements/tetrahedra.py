@@ -18,9 +18,10 @@ def shape(xi: AnyArray) -> AnyArray:
 TET4 = Element(
     "tet4", np.vstack([np.zeros(3), np.eye(3)]), edges=((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
     facets=((0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)), shape=shape, quadrature=tetrahedron_1(),
-    meshio="tetra", med="TE4", vtk=10, quadratic="tet10",
+    meshio="tetra", med="TE4", vtk=10, xdmf=0x6, quadratic="tet10",
 )  # fmt: skip
 TET10 = quadratic(
-    "tet10", TET4, quadratic_simplex(TET4), quadrature=tetrahedron_5(), meshio="tetra10", med="T10", vtk=24, dilatation=0
+    "tet10", TET4, quadratic_simplex(TET4), quadrature=tetrahedron_5(), meshio="tetra10", med="T10", vtk=24, xdmf=0x26,
+    dilatation=0,
 )  # fmt: skip
 ELEMENTS = TET10, TET4

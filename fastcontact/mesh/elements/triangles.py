@@ -19,9 +19,10 @@ def shape(xi: AnyArray) -> AnyArray:
 
 TRI3 = Element(
     "tri3", np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), EDGES, facets=EDGES, shape=shape,
-    quadrature=triangle(1), meshio="triangle", med="TR3", vtk=5, quadratic="tri6",
+    quadrature=triangle(1), meshio="triangle", med="TR3", vtk=5, xdmf=0x4, quadratic="tri6",
 )  # fmt: skip
 TRI6 = quadratic(
-    "tri6", TRI3, quadratic_simplex(TRI3), quadrature=triangle(4), meshio="triangle6", med="TR6", vtk=22, dilatation=0
-)
+    "tri6", TRI3, quadratic_simplex(TRI3), quadrature=triangle(4), meshio="triangle6", med="TR6", vtk=22, xdmf=0x24,
+    dilatation=0,
+)  # fmt: skip
 ELEMENTS = TRI3, TRI6

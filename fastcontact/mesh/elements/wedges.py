@@ -20,8 +20,8 @@ TWICE = np.tile(np.arange(3), 2)  # number of the triangle corner below or above
 WEDGE6 = Element(
     "wedge6", NODES, edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
     facets=((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), shape=shape,
-    quadrature=tensor_product(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, quadratic="wedge15",
-    dilatation=0,
+    quadrature=tensor_product(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, xdmf=0x8,
+    quadratic="wedge15", dilatation=0,
 )  # fmt: skip
 # Ends of the edges of the two triangles, and the coordinate z = -1 or 1 of each edge.
 A, B = np.array(WEDGE6.edges[:6]).T
@@ -37,12 +37,12 @@ def shape_15(xi: AnyArray) -> AnyArray:
 
 
 WEDGE15 = quadratic(
-    "wedge15", WEDGE6, (with_midpoints(WEDGE6), shape_15), meshio="wedge15", med="P15", vtk=26, dilatation=0,
+    "wedge15", WEDGE6, (with_midpoints(WEDGE6), shape_15), meshio="wedge15", med="P15", vtk=26, xdmf=0x28, dilatation=0,
     quadrature=tensor_product(triangle(5), gauss_line(3)),
 )  # fmt: skip
 CENTRES = np.column_stack([TRI6.nodes[3:], np.zeros(3)])
 WEDGE18 = quadratic(
     "wedge18", WEDGE6, product(np.vstack([WEDGE15.nodes, CENTRES]), TRI6, LINE3), quadrature=WEDGE15.quadrature,
-    meshio="wedge18", med="P18", vtk=32, dilatation=0,
+    meshio="wedge18", med="P18", vtk=32, xdmf=0x29, dilatation=0,
 )  # fmt: skip
 ELEMENTS = WEDGE15, WEDGE18, WEDGE6

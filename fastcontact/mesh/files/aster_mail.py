@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact.arrays import Indices
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.files.meshio_content import VERTEX, Block, build_mesh
+from fastcontact.mesh.files.meshio_content import VERTEX, Block, FileContent, build_mesh
 from fastcontact.mesh.mesh import Mesh
 
 # Element types by keyword.
@@ -36,8 +36,8 @@ IGNORED_KEYWORDS = ("TITRE",)
 Word = tuple[str, int]
 
 
-def read(path: Path) -> tuple[Mesh, dict[str, int]]:
-    """Return the mesh of a file, and the numbers of omitted cells by kind, see `meshio_content.build_mesh`.
+def read(path: Path) -> FileContent:
+    """Return the content of a file.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
     for keyword, line in words:
         if keyword.upper() == "FIN":
             try:
-                return content.mesh()
+                return FileContent(*content.mesh(), "code_aster")
             except MeshError as error:
                 raise MeshError(f"'{path}': {error}") from None
         content.add(keyword.upper(), line, _read_block(path, keyword, line, words))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 from fastcontact.errors import FileError, MeshError, check_known, warn
 from fastcontact.mesh import elements
-from fastcontact.mesh.files.meshio_content import VERTEX, Block, build_mesh, check_kinds
+from fastcontact.mesh.files.meshio_content import VERTEX, Block, FileContent, build_mesh, check_kinds
 from fastcontact.mesh.mesh import Mesh
 
 # Elements whose node order differs in MED: node k here is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid as
@@ -46,16 +46,7 @@ LEVELS = 2
 Families = dict[int, tuple[str, ...]]
 
 
-class MedContent(NamedTuple):
-    """A mesh, its name in the file, the version of the format ("" if unknown), and the number of one-node cells."""
-
-    mesh: Mesh
-    name: str
-    version: str
-    n_vertices: int
-
-
-def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
+def read_med(path: PathLike, mesh_name: str | None = None) -> FileContent:
     """Read a mesh with its groups; the orientation of the cells is that of the file.
 
     If the file contains several meshes, `mesh_name` is read; if the mesh has several time steps, the first one is read.
@@ -68,7 +59,7 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
             raise MeshError(f"mesh '{name}' of '{path}': {error}") from None
         info = file.get("INFOS_GENERALES", file)
         version = [str(int(attribute(info, key))) for key in ("MAJ", "MIN", "REL") if key in info.attrs]
-        return MedContent(mesh, name, ".".join(version), omitted["vertex"])
+        return FileContent(mesh, omitted, f"MED {'.'.join(version)}".strip(), name)
 
 
 def _mesh_to_read(file: Any, path: PathLike, mesh_name: str | None) -> str:

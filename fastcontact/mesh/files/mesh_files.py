@@ -82,19 +82,13 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
     file = existing_file(path)
     if file.suffix.lower() in med.MED_SUFFIXES:
         content = med.read_med(file, mesh_name)
-        mesh, file_format, name = content.mesh, f"MED {content.version}".strip(), content.name
-        dropped = {"vertex": content.n_vertices}
     elif mesh_name is not None:
         raise FileError(f"'{path}' is not a MED file, so its mesh has no name: omit mesh_name='{mesh_name}'")
-    elif file.suffix.lower() == MAIL_SUFFIX:
-        mesh, dropped = aster_mail.read(file)
-        file_format, name = "code_aster", ""
     else:
-        mesh, file_format, dropped = meshio_files.read(file)
-        name = ""
-    mesh, n_turned = topology.oriented(mesh) if orient else (mesh, 0)
-    left_out = MappingProxyType({kind: count for kind, count in dropped.items() if count})
-    report = MeshReport(str(path), file_format, name, n_turned, left_out)
+        content = (aster_mail if file.suffix.lower() == MAIL_SUFFIX else meshio_files).read(file)
+    mesh, n_turned = topology.oriented(content.mesh) if orient else (content.mesh, 0)
+    left_out = MappingProxyType({kind: count for kind, count in content.omitted.items() if count})
+    report = MeshReport(str(path), content.format, content.name, n_turned, left_out)
     logger.info("read %s", report)
     return mesh, report
 

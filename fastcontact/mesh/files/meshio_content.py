@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 import numpy as np
@@ -30,6 +30,15 @@ VERTEX = "vertex"
 # Largest number of unknown kinds of cells in a message, and of characters of each name.
 MAX_SHOWN = 12
 Groups = dict[str, AnyArray]
+
+
+class FileContent(NamedTuple):
+    """A mesh, the numbers of omitted cells by kind, see `build_mesh`, the format, and the name of the mesh in the file."""
+
+    mesh: Mesh
+    omitted: Mapping[str, int]
+    format: str
+    name: str = ""
 
 
 def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, dict[str, int]]:

@@ -21,7 +21,7 @@ from fastcontact.arrays import AnyArray, Numbers
 from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import abaqus, gmsh_versions
-from fastcontact.mesh.files.meshio_content import INCONSISTENCY_ERRORS, NODE_ORDER, VERTEX, Orders, mesh_of
+from fastcontact.mesh.files.meshio_content import INCONSISTENCY_ERRORS, NODE_ORDER, VERTEX, FileContent, Orders, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, library, read_in_process
 from fastcontact.mesh.mesh import Mesh
 
@@ -131,8 +131,8 @@ def read_data(path: Path, field: str, at_points: bool) -> tuple[AnyArray, AnyArr
     return np.concatenate(values), np.concatenate([points[block].mean(axis=1) for block in nodes])
 
 
-def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
-    """Return a mesh with its groups, the format, and counts of omitted cells by kind; see `meshio_content.mesh_of`."""
+def read(path: Path) -> FileContent:
+    """Return the content of a file; see `meshio_content.mesh_of`."""
     file_format = _format(path, writing=False)
     if file_format == "gmsh":
         with tempfile.TemporaryDirectory() as folder:
@@ -141,12 +141,11 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
         content = _read_content(path, path, file_format)
     _log("read", path, content["output"])
     try:
-        mesh, dropped = mesh_of(content, file_format)
+        return FileContent(*mesh_of(content, file_format), file_format)
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
     except INCONSISTENCY_ERRORS as error:
         raise FileError(f"the parts of '{path}' are inconsistent: check the file, or convert it to .med") from error
-    return mesh, file_format, dropped
 
 
 def _check_input(path: Path, file_format: str) -> None:

@@ -28,15 +28,16 @@ class _Pattern:
     """The division of a cell of one element type, described by the points of its children.
 
     The first n_nodes points are the nodes of the parent, and m new points follow. `children` (n_children, n_nodes) are the
-    points of each child. `shape` (m, n_nodes) [-] contains the shape functions of the parent at the new points. `edge_number`
-    (m,) is the number of the edge of the parent on which a new point lies, -1 inside the parent, and `quarters` (m,) its
-    distance from the start of this edge in quarters of the length. `parents` (m, n_nodes) is true for the nodes of this edge,
-    or for all nodes if the point lies inside the parent.
+    points of each child. `shape` (m, n_nodes) [-] contains the shape functions of the parent at the new points. `on_edge`
+    (m,) states whether a new point lies on an edge of the parent, `ends` (m, 2) are the corners at the ends of this edge, and
+    `quarters` (m,) is the distance from the first end in quarters of the length. `parents` (m, n_nodes) is true for the nodes
+    of this edge, or for all nodes if the point lies inside the parent.
     """
 
     children: AnyArray
     shape: Array
-    edge_number: AnyArray
+    on_edge: Mask
+    ends: AnyArray
     quarters: AnyArray
     parents: Mask
 
@@ -59,15 +60,13 @@ def _pattern(name: str) -> _Pattern:
             child.append(points.index(node))
         children.append(child)
     new_points = np.array(points)[element.n_nodes :]
-    edge_number, quarters = np.full(len(new_points), -1), np.zeros(len(new_points), int)
-    parents = np.ones((len(new_points), element.n_nodes), bool)
-    for number, (a, b) in enumerate(element.edges):
-        start, edge = element.nodes[a], element.nodes[b] - element.nodes[a]
-        fraction = (new_points - start) @ edge / (edge @ edge)
-        is_on_edge = np.abs(new_points - start - fraction[:, None] * edge).max(axis=1) < 1e-12
-        edge_number[is_on_edge], quarters[is_on_edge] = number, np.round(4 * fraction[is_on_edge]).astype(int)
-        parents[is_on_edge] = np.isin(np.arange(element.n_nodes), [a, b, element.n_corners + number])
-    return _Pattern(np.array(children), element.shape(new_points), edge_number, quarters, parents)
+    # On an edge, only the functions of its nodes differ from zero.
+    weights, shape = element.corner_shape(new_points), element.shape(new_points)
+    on_edge = (np.abs(weights) > 1e-12).sum(axis=1) == 2
+    ends = np.argsort(np.abs(weights) <= 1e-12, axis=1, kind="stable")[:, :2]
+    quarters = np.round(4 * np.take_along_axis(weights, ends[:, 1:], axis=1)[:, 0]).astype(int)
+    parents = (np.abs(shape) > 1e-12) | ~on_edge[:, None]
+    return _Pattern(np.array(children), shape, on_edge, ends, quarters, parents)
 
 
 @typed(MeshError)
@@ -126,10 +125,10 @@ def _lattices(mesh: Mesh) -> tuple[AnyArray, dict[str, AnyArray]]:
     """
     keys, next_key = [], 4 * mesh.n_points**2  # keys of edges are smaller
     for name, block in mesh.cells.items():
-        pattern, ends = _pattern(name), block[:, elements.get(name).edges].astype(np.int64)
-        start, end = np.moveaxis(ends[:, pattern.edge_number], 2, 0)
+        pattern = _pattern(name)
+        start, end = np.moveaxis(block[:, pattern.ends].astype(np.int64), 2, 0)
         keys.append(_keys(start, end, pattern.quarters, mesh.n_points))
-        inside = np.flatnonzero(pattern.edge_number < 0)
+        inside = np.flatnonzero(~pattern.on_edge)
         separate = np.arange(len(inside) * len(block)).reshape(len(inside), len(block))
         keys[-1][:, inside] = next_key + separate.T
         next_key += separate.size

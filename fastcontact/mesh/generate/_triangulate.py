@@ -14,6 +14,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import check_size
 from fastcontact.mesh.generate._spacing import Spacing
+from fastcontact.mesh.generate.quadratic import ends_of, unique_edges
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import corner_angles
 
@@ -87,7 +88,7 @@ def _midpoints_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> A
 
     Relative to the spacing, each is the longest of all edges at its two ends.
     """
-    edges = edges_of(delaunay(points))
+    edges = ends_of(unique_edges({"tri3": delaunay(points)}))
     # Sides of the outline are excluded, but not chords that cut off a corner.
     is_side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
     edges = edges[~is_side]
@@ -214,15 +215,6 @@ def delaunay(points: Array) -> Indices:
     return triangles[~flat]
 
 
-def edges_of(triangles: Indices) -> Indices:
-    """Return the edges (n_edges, 2) of `triangles` (n_triangles, 3), each once, with the smaller point number first."""
-    ends = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    ends.sort(axis=1)
-    n = int(ends.max()) + 1
-    keys = np.unique(ends[:, 0] * n + ends[:, 1])
-    return np.column_stack([keys // n, keys % n])
-
-
 def stars_of(triangles: Indices, n_points: int) -> Indices:
     """Return the edges (n_points, degree, 2) of `triangles` (n_triangles, 3) opposite to each point, padded with -1."""
     centre = triangles.ravel()
@@ -248,7 +240,7 @@ def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
         return points
     for step in range(steps):
         if step % _STEPS_PER_TRIANGULATION == 0:
-            edges = edges_of(delaunay(points))
+            edges = ends_of(unique_edges({"tri3": delaunay(points)}))
             edges = edges[movable[edges].any(axis=1)]
             desired = size(points[edges].mean(axis=1))
         points[movable] += _STEP * _bar_forces(points, edges, desired)[movable]
@@ -284,7 +276,7 @@ def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
             if not moved:
                 break
             triangles = delaunay(points)
-            edges, stars, moved = edges_of(triangles), stars_of(triangles, len(points)), False
+            edges, stars, moved = ends_of(unique_edges({"tri3": triangles})), stars_of(triangles, len(points)), False
         moved |= _sweep(points, movable, edges, stars, limit(points), radius)
         radius *= 0.9
     return points

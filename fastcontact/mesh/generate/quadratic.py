@@ -113,7 +113,7 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
     (140, 6)
     """
     names = _quadratic_names(mesh, centre_nodes)
-    edges = _edges(mesh.cells)
+    edges = unique_edges(mesh.cells)
     midpoints = mesh.points[ends_of(edges)].mean(axis=1)
     for curve in curves:
         rows = np.searchsorted(edges, edges_on(mesh, curve))
@@ -169,8 +169,8 @@ def edges_of(name: str, cells: AnyArray) -> AnyArray:
     return edge_keys(cells[:, elements.get(name).edges])
 
 
-def _edges(cells: Mapping[str, AnyArray]) -> AnyArray:
-    """Return the sorted, unique keys of the edges of all cells."""
+def unique_edges(cells: Mapping[str, AnyArray]) -> AnyArray:
+    """Return the keys (n,) of int of the edges of all `cells` (n_cells, n_nodes) of int, each once, in ascending order."""
     keys = [edges_of(name, block).ravel() for name, block in cells.items()]
     return np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
 
@@ -180,7 +180,7 @@ def edges_on(mesh: Mesh, curve: Curve) -> AnyArray:
 
     Raises MeshError if there is no such edge.
     """
-    edges = _edges(facets_of(mesh, curve))
+    edges = unique_edges(facets_of(mesh, curve))
     on_curve = lies_on_curve(mesh, curve, ends_of(edges))
     if not on_curve.any():
         facets = "outer facets" if curve.group is None else f"group '{curve.group}'"

@@ -10,7 +10,8 @@ from refusals import refused
 
 import fastcontact as fc
 from fastcontact.mesh.generate._spacing import Spacing, divide, progression
-from fastcontact.mesh.generate._triangulate import delaunay, edges_of, stars_of, triangulated_body
+from fastcontact.mesh.generate._triangulate import delaunay, stars_of, triangulated_body
+from fastcontact.mesh.generate.quadratic import ends_of, unique_edges
 
 size = st.floats(0.01, 1.0)
 
@@ -89,7 +90,7 @@ def test_triangles_cover_the_hull_and_stars_close_around_inner_points():
     triangles = delaunay(points)
     u, v = points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
     assert 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum() == pytest.approx(4.0)
-    edges = edges_of(triangles)
+    edges = ends_of(unique_edges({"tri3": triangles}))
     assert len(points) - len(edges) + len(triangles) == 1
     star = stars_of(triangles, len(points))[5]
     ring = star[star[:, 0] >= 0]
