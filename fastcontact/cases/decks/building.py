@@ -17,10 +17,16 @@ from fastcontact.cases.decks.blocks import errors_at, key_of, look_up
 from fastcontact.cases.decks.conditions import Component, Conditions
 from fastcontact.cases.decks.constraints import add_rotation_points, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
-from fastcontact.cases.decks.fields import add_initial_stresses
 from fastcontact.cases.decks.gaps import GAP_TOLERANCE, add_gap_facets, add_gaps, add_springs
 from fastcontact.cases.decks.histories import Period, ShapeGroups
-from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
+from fastcontact.cases.decks.loads import (
+    add_forces,
+    add_initial_stresses,
+    add_temperatures,
+    distributed_loads,
+    heat_loads,
+    point_group,
+)  # fmt: skip
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import check_nodes, deck_mesh_of, group_of_surface
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
