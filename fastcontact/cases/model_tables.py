@@ -7,7 +7,7 @@ import inspect
 import reprlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastcontact.cases import keys
 from fastcontact.cases.keys import NUMBER, call_with_keys, check_keys, errors_at, list_of_tables
@@ -22,9 +22,6 @@ from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
-
-if TYPE_CHECKING:
-    from fastcontact.contact.obstacles import Obstacle
 
 # Keys whose values may depend on the position.
 VARYING = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coefficient", "ambient", *COMPONENTS)
@@ -240,7 +237,7 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
         model.add_obstacle(name, obstacle=obstacle, **_arguments(where, options, model.mesh, folder))
 
 
-def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
+def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Any:
     """Return the rigid shape that a table describes by its kind and its arguments; `mesh` is the mesh of the model."""
     from fastcontact.contact.obstacles import SHAPES, MeshedSurface
 
@@ -256,8 +253,7 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
         check_keys(where, arguments, keys.SURFACE)
         file = arguments.pop("file", None)
         arguments["mesh"] = mesh if file is None else read_mesh(folder / file)
-    obstacle: Obstacle = call_with_keys(where, MeshedSurface if kind == "mesh" else SHAPES[kind], arguments)
-    return obstacle
+    return call_with_keys(where, MeshedSurface if kind == "mesh" else SHAPES[kind], arguments)
 
 
 def _arguments(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:

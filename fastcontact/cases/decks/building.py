@@ -148,13 +148,13 @@ class Building:
             raise cell.error(f"{count} ({missing[0].number}){set_text} has no section, so no material")
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.assembly.solids:
-            section = element.assigned_section
-            key = (key_of(section.material), key_of(section.orientation), element.solid.incompatible_modes)
+            section = element.section
+            key = (key_of(section.material), key_of(section.orientation), element.type.incompatible_modes)
             by_material.setdefault(key, []).append(element)
         materials = []
         for (name, orientation, incompatible_modes), members in by_material.items():
             material = self.content.materials[name]
-            axes = self._axes(members[0].assigned_section, members)
+            axes = self._axes(members[0].section, members)
             group = f"material {material.name}" + (f" along {orientation.lower()}" if orientation else "")
             group += " with incompatible modes" if incompatible_modes else ""
             law = law_of(self.content, material, axes, incompatible_modes)

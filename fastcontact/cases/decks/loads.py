@@ -98,7 +98,7 @@ def _density(deck_mesh: DeckMesh, element: Element, load: Target) -> float:
     """Return the factor of a body force at an element: the density of its material, or 1 for a force per volume."""
     if load.kind[0] == "B":
         return 1.0
-    material = deck_mesh.content.materials[key_of(element.assigned_section.material)]
+    material = deck_mesh.content.materials[key_of(element.section.material)]
     if material.density is None:
         raise load.location.error(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
     return material.density
