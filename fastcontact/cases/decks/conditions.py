@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -53,7 +53,9 @@ class Conditions:
 
     def __init__(self, assembly: DeckMesh) -> None:
         self.assembly, content = assembly, assembly.content
-        initial = initial_temperatures(assembly, content.blocks["INITIAL TEMPERATURE"])
+        lines = (row for block in content.blocks["INITIAL TEMPERATURE"] for row in block.iter_rows())
+        temperatures = (temperature_of(assembly, row) for row in lines)
+        initial = {point: value for points, value, _ in temperatures for point in points}  # the last value applies
         self.reference = reference_temperature(assembly, initial) if content.heat else 0.0
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
@@ -229,12 +231,6 @@ class Conditions:
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:
             return (point, axis, False), float(np.sign(direction[axis]))
         return (point, number, True), 1.0
-
-
-def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
-    """Return the initial temperatures by point; the last of several values at a point applies."""
-    temperatures = (temperature_of(assembly, row) for block in blocks for row in block.iter_rows())
-    return {point: value for points, value, _ in temperatures for point in points}
 
 
 def temperature_of(assembly: Assembly, row: Row) -> tuple[list[int], float, Location]:
