@@ -213,16 +213,12 @@ def _case_of_deck(path: Path) -> Case:
     deck = read_deck(path)
     return Case(
         name=path.stem,
-        title=deck.title,
         text=deck.model.case_text,
         mesh=deck.model.mesh,
-        model=deck.model,
-        ramp=deck.ramp,
-        criteria=deck.criteria,
         units=known_units({}),
         folder=path.parent.resolve(),
-        modes=deck.modes,
         deck=deck,
+        **{name: getattr(deck, name) for name in ("title", "model", "ramp", "criteria", "modes")},
     )
 
 
