@@ -166,11 +166,7 @@ class Case:
     @property
     def solve_arguments(self) -> dict[str, Any]:
         """Keyword arguments of `fastcontact.solve` that the case specifies."""
-        return {
-            "linear_solver": self.linear_solver,
-            "linear_tolerance": self.linear_tolerance,
-            "criteria": self.criteria,
-        }
+        return {name: getattr(self, name) for name in ("linear_solver", "linear_tolerance", "criteria")}
 
     def finished(self, step: StepResult) -> StepResult:
         """Return a step as result files store it; the steps of an input deck are converted by `Deck.finished`."""
@@ -217,16 +213,12 @@ def _case_of_deck(path: Path) -> Case:
     deck = read_deck(path)
     return Case(
         name=path.stem,
-        title=deck.title,
         text=deck.model.case_text,
         mesh=deck.model.mesh,
-        model=deck.model,
-        ramp=deck.ramp,
-        criteria=deck.criteria,
         units=known_units({}),
         folder=path.parent.resolve(),
-        modes=deck.modes,
         deck=deck,
+        **{name: getattr(deck, name) for name in ("title", "model", "ramp", "criteria", "modes")},
     )
 
 
@@ -446,10 +438,5 @@ def stored_description(data: dict[str, Any]) -> dict[str, Any]:
 
     `data` is the parsed text. It is empty for results without a case file.
     """
-    theories, approach = _theories(data)
-    return {
-        "title": data.get("title", ""),
-        "theories": theories,
-        "approach": approach,
-        "ramp": _ramp(data.get("ramp", {})).table,
-    }
+    (theories, approach), ramp = _theories(data), _ramp(data.get("ramp", {})).table
+    return {"title": data.get("title", ""), "theories": theories, "approach": approach, "ramp": ramp}

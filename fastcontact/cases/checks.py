@@ -235,15 +235,11 @@ def outcome(check: Check, step: StepResult, probes: Mapping[str, int], theories:
     solution = theory.get("mesh_converged")
     mesh_converged = check.target(solution) if hasattr(solution, check.of) else None
     return {
-        "name": check.name,
-        "quantity": check.quantity,
+        **{name: getattr(check, name) for name in ("name", "quantity", "unit", "source", "tolerance")},
         "value": value,
         "target": target,
-        "unit": check.unit,
         "of": check.of if check.theory else None,
-        "source": check.source,
         "deviation": value / target - 1.0,
-        "tolerance": check.tolerance,
         "passed": bool(abs(value / target - 1.0) <= check.tolerance),
         "distance_to_mesh_converged": None if mesh_converged is None else value / mesh_converged - 1.0,
         "mesh_converged_deviation": None if mesh_converged is None else mesh_converged / target - 1.0,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 import inspect
 import reprlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastcontact.cases import keys
 from fastcontact.cases.keys import NUMBER, call_with_keys, check_keys, errors_at, list_of_tables
@@ -22,9 +22,6 @@ from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
-
-if TYPE_CHECKING:
-    from fastcontact.contact.obstacles import Obstacle
 
 # Keys whose values may depend on the position.
 VARYING = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coefficient", "ambient", *COMPONENTS)
@@ -178,8 +175,7 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, functions: Mapp
                 required = [key for key, parameter in constants.items() if parameter.default is parameter.empty]
             check_keys(where, entry, known, required)
             with errors_at(where):
-                values = _read_fields(where, entry, model.mesh, folder) if kind == "material" else entry
-                add(model, **_arguments(where, _resolve_paths(folder, _convert(where, values, VARYING, _interpolant))))
+                add(model, **_arguments(where, entry, model.mesh, folder))
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
@@ -201,56 +197,6 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
     if pairs == "auto" or "contacts" in data:
         with errors_at("contacts"):
             model.add_contacts(**data.get("contacts", {}))
-
-
-def _read_fields(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:
-    """Return a material entry in which the constants specified as fields in files are replaced by arrays."""
-
-    def read(name: str, value: Any) -> Any:
-        if not (isinstance(value, dict) and "file" in value):
-            return value
-        check_keys(name, value, keys.FIELD)
-        if "field" not in value:
-            raise CaseError(f"'{name}' needs 'field', the name of the field in the file")
-        from fastcontact.mesh.files.mesh_fields import read_field
-
-        return read_field(mesh, groups=entry.get("groups"), **_resolve_paths(folder, value))
-
-    return _convert(where, entry, CONSTANTS, read)
-
-
-def _convert(
-    where: str, entry: dict[str, Any], names: Sequence[str], convert: Callable[[str, Any], Any]
-) -> dict[str, Any]:
-    """Return an entry with `convert` applied to the values of the keys `names`, and to each member of a list.
-
-    The arguments of `convert` are the location of the value in the case file, for messages, and the value.
-    """
-    values = dict(entry)
-    for key in (name for name in names if name in entry):
-        value = entry[key]
-        if isinstance(value, list):
-            values[key] = [convert(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
-        else:
-            values[key] = convert(f"{where}.{key}", value)
-    return values
-
-
-def _resolve_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry with the paths in `file` resolved relative to the folder of the case file."""
-    file = entry.get("file")
-    if file is None:
-        return entry
-    names = file if isinstance(file, list) else [file]
-    if not all(isinstance(name, str) for name in names):
-        raise CaseError(f"'file' must be a path or a list of paths, not {reprlib.repr(file)}")
-    paths = [folder / name for name in names]
-    return {**entry, "file": paths if isinstance(file, list) else paths[0]}
-
-
-def _interpolant(where: str, value: Any) -> Any:
-    """Return the function that interpolates `value`, a table of values by position; return other values unchanged."""
-    return call_with_keys(where, Tabulated, value) if isinstance(value, dict) else value
 
 
 def _cut_sections(mesh: Mesh, sections: Any) -> Mesh:
@@ -288,10 +234,10 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
         shape = {"kind": "mesh", **{key: options.pop(key) for key in keys.SURFACE if key in options}}
     obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
     with errors_at(where):
-        model.add_obstacle(name, obstacle=obstacle, **_arguments(where, options))
+        model.add_obstacle(name, obstacle=obstacle, **_arguments(where, options, model.mesh, folder))
 
 
-def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
+def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Any:
     """Return the rigid shape that a table describes by its kind and its arguments; `mesh` is the mesh of the model."""
     from fastcontact.contact.obstacles import SHAPES, MeshedSurface
 
@@ -307,30 +253,71 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
         check_keys(where, arguments, keys.SURFACE)
         file = arguments.pop("file", None)
         arguments["mesh"] = mesh if file is None else read_mesh(folder / file)
-    obstacle: Obstacle = call_with_keys(where, MeshedSurface if kind == "mesh" else SHAPES[kind], arguments)
-    return obstacle
+    return call_with_keys(where, MeshedSurface if kind == "mesh" else SHAPES[kind], arguments)
 
 
-def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return the keys of an entry as arguments of a method of `Model`, with axes, rotation and ramp as objects.
+def _arguments(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:
+    """Return the keys of an entry as arguments of a method of `Model`, in which objects replace tables and lists.
 
-    Raises CaseError if one of these, or a term of a multi-point constraint, is invalid.
+    `mesh` is the mesh of the model, for fields in files, and paths are relative to `folder`. Raises CaseError if a value is
+    invalid.
     """
-    arguments = {key: value for key, value in entry.items() if key != "place"}  # `_add_references` has read the place
-    if isinstance(entry.get("axes"), dict):
-        arguments["axes"] = call_with_keys(f"{where}.axes", CylindricalAxes, entry["axes"])
-    if isinstance(entry.get("rotation"), dict):
-        arguments["rotation"] = _arguments(f"{where}.rotation", entry["rotation"])
-    if "ramp" in entry:
-        arguments["ramp"] = ramp_points(entry["ramp"], f"{where}.ramp")
-    terms = entry.get("terms", [])
+    arguments = dict(entry)
+    arguments.pop("place", None)  # `_add_references` has read it
+    for key, value in arguments.items():
+        label, is_table = f"{where}.{key}", isinstance(value, dict)
+        if key == "file":
+            arguments[key] = _paths(folder, value)
+        elif key == "ramp":
+            arguments[key] = ramp_points(value, label)
+        elif key == "terms":
+            _check_terms(label, value)
+        elif key == "axes" and is_table:
+            arguments[key] = call_with_keys(label, CylindricalAxes, value)
+        elif key == "rotation" and is_table:
+            arguments[key] = _arguments(label, value, mesh, folder)
+        elif key in VARYING:
+            arguments[key] = _varying(label, value, mesh, entry.get("groups"), folder)
+    return arguments
+
+
+def _varying(where: str, value: Any, mesh: Mesh, groups: Any, folder: Path) -> Any:
+    """Return the field in a file, or the function that interpolates values by position, that a table specifies.
+
+    Members of a list are converted in the same way, and other values are returned unchanged. `where` is the location of the
+    value in the case file, for messages. A file contains the field of a constant of a material of `groups`.
+    """
+    if isinstance(value, list):
+        return [_varying(f"{where}[{i}]", member, mesh, groups, folder) for i, member in enumerate(value)]
+    if not isinstance(value, dict):
+        return value
+    if "file" not in value or where.rpartition(".")[2].partition("[")[0] not in CONSTANTS:
+        return call_with_keys(where, Tabulated, value)
+    check_keys(where, value, keys.FIELD)
+    if "field" not in value:
+        raise CaseError(f"'{where}' needs 'field', the name of the field in the file")
+    from fastcontact.mesh.files.mesh_fields import read_field
+
+    return read_field(mesh, groups=groups, **{**value, "file": _paths(folder, value["file"])})
+
+
+def _paths(folder: Path, file: Any) -> Path | list[Path]:
+    """Return a path or a list of paths, which are relative to the folder of the case file."""
+    if isinstance(file, str):
+        return folder / file
+    if not isinstance(file, list) or not all(isinstance(name, str) for name in file):
+        raise CaseError(f"'file' must be a path or a list of paths, not {reprlib.repr(file)}")
+    return [folder / name for name in file]
+
+
+def _check_terms(where: str, terms: Any) -> None:
+    """Raise CaseError unless the terms of a multi-point constraint are lists of group or point, component and coefficient."""
+    kinds: list[Any] = [(str, int), str, NUMBER]
     for term in terms if isinstance(terms, list) else [terms]:
-        kinds: list[Any] = [(str, int), str, NUMBER]
         if not isinstance(term, list) or len(term) != 3 or not all(map(isinstance, term, kinds)):
             raise CaseError(
-                f"'{where}.terms' must be a list of [group or point, component, coefficient], not {reprlib.repr(term)}"
+                f"'{where}' must be a list of [group or point, component, coefficient], not {reprlib.repr(term)}"
             )
-    return arguments
 
 
 def ramp_points(table: list[Any], where: str = "ramp.table") -> Table:

@@ -93,44 +93,38 @@ def _heat(last: StepResult) -> dict[str, Any]:
 
 def _modes(modes: Modes) -> dict[str, Any]:
     """Return the natural frequencies and effective masses, and for cyclic sectors the nodal diameters and mode pairs."""
-    table = {"frequencies": modes.frequencies.tolist(), "effective_mass": modes.effective_mass.tolist()}
-    if modes.nodal_diameters is None or modes.twins is None:
-        return table
-    return {**table, "nodal_diameters": modes.nodal_diameters.tolist(), "twins": modes.twins.tolist()}
+    names = ("frequencies", "effective_mass", "nodal_diameters", "twins")
+    return {name: values.tolist() for name in names if (values := getattr(modes, name)) is not None}
 
 
 def step_entry(step: StepResult) -> dict[str, Any]:
     """Return the entry of a step in the summary: load factor, numbers of iterations, work [energy] and pretension."""
     counts = ("geometry_updates", "active_set_iterations", "linear_iterations")
     summary = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
-    if "substeps" in step.iterations:
-        summary["substeps"] = step.iterations["substeps"]
-    if dissipation := {name: contact.dissipation for name, contact in step.contact.items() if contact.dissipation}:
-        summary["dissipation"] = dissipation
-    if step.work:
-        summary["work"] = step.work
-    if step.pretension:
-        summary["pretension"] = step.pretension
-    return summary
+    optional = {
+        "substeps": step.iterations.get("substeps"),
+        "dissipation": {name: contact.dissipation for name, contact in step.contact.items() if contact.dissipation},
+        **{name: getattr(step, name) for name in ("work", "pretension")},
+    }
+    return summary | {name: values for name, values in optional.items() if values}
 
 
 def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
     """Return the summary of a contact pair in the last step from its `ContactResult`, with the `penalty` of the pair."""
     displacement = contact.obstacle_displacement
     return {
-        "formulation": contact.formulation,
+        **{
+            name: getattr(contact, name)
+            for name in ("formulation", "force_parts", "extent", "pressure_max", "penetration")
+        },
         "force": float(np.linalg.norm(contact.force)),
         "force_vector": contact.force.tolist(),
-        "force_parts": contact.force_parts,
         "radius": _json_value(contact.radius),
-        "extent": contact.extent,
-        "pressure_max": contact.pressure_max,
         "middle": contact.middle.tolist(),
         "closed_nodes": int(contact.active.sum()),
         "obstacle_displacement": None if displacement is None else displacement.tolist(),
         **({} if contact.torque is None else {"obstacle_angle": contact.obstacle_angle, "torque": contact.torque}),
         **({} if contact.wear is None else {"wear_max": float(contact.wear.max(initial=0.0))}),
-        "penetration": contact.penetration,
         "penalty": penalty,
     }
 

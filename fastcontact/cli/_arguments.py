@@ -27,8 +27,5 @@ def declare(parser: Any, table: Mapping[str, Any], **settings: Any) -> None:
 
 def add_verbosity(parser: Any, default: Any) -> None:
     """Add the verbosity options, which all commands share, with the default value `default`."""
-    table = {
-        "-v --verbose": "report what is being done and why",
-        "-q --quiet": "print nothing but errors and warnings",
-    }
+    table = {"-v --verbose": "report what is being done and why", "-q --quiet": "print nothing but errors and warnings"}
     declare(parser.add_mutually_exclusive_group(), table, default=default)

@@ -33,18 +33,15 @@ def run(options: Namespace) -> int:
 
         with open_results(options.file) as results:
             rows = [*_mesh_lines(results.mesh), *_result_lines(results)]
-    elif suffix == ".inp" and _is_deck(file):
-        from fastcontact.cases.decks.deck import read_deck
-
-        deck = read_deck(options.file)
-        factors = ", ".join(f"{t:g}" for t in deck.ramp.instants)
-        rows = [f"{deck.path}: {deck.title}", repr(deck.model), f"load factors: {factors}"]
-        rows += [*(f"  note: {text}" for text in deck.notes), *_mesh_lines(deck.model.mesh)]
-    elif suffix == ".toml":
+    elif _is_case(file):
         from fastcontact.cases.case import read_case
 
         case = read_case(options.file)
-        rows = [f"{options.file}: {case.title}", repr(case.model), *_mesh_lines(case.mesh)]
+        rows = [f"{options.file}: {case.title}", repr(case.model)]
+        if case.deck is not None:
+            rows.append(f"load factors: {', '.join(f'{t:g}' for t in case.ramp.instants)}")
+            rows += [f"  note: {text}" for text in case.deck.notes]
+        rows += _mesh_lines(case.mesh)
     else:
         from fastcontact.mesh.files.mesh_files import read_mesh_report
         from fastcontact.mesh.quality import quality
@@ -61,8 +58,7 @@ def _show_contacts(options: Namespace) -> int:
     from fastcontact.contact.found_contacts import find_contacts
     from fastcontact.results import plot
 
-    path = Path(options.file)
-    is_case = path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
+    is_case = _is_case(Path(options.file))
     check_outputs(files_of_case(options.file) if is_case else [options.file], [], [options.png])
     mesh = read_case(options.file).mesh if is_case else _mesh_of(options.file)
     contacts = find_contacts(mesh, distance=options.distance, angle=options.angle)
@@ -85,8 +81,10 @@ def _mesh_of(file: str) -> Any:
     return read_mesh(file)
 
 
-def _is_deck(path: Path) -> bool:
-    """Return whether an Abaqus file contains steps, parts or included files in addition to a mesh."""
+def _is_case(path: Path) -> bool:
+    """Return whether a file is a case file, or an Abaqus file with steps, parts or included files in addition to a mesh."""
+    if path.suffix.lower() != ".inp":
+        return path.suffix.lower() == ".toml"
     from fastcontact._tools.paths import existing_file
 
     keywords = ("*STEP", "*PART", "*INCLUDE")

@@ -8,8 +8,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from fastcontact.cases.decks.assembled import corners_of_facets
 from fastcontact.cases.decks.element_types import element_type
+from fastcontact.mesh import elements
 
 CCX = shutil.which("ccx")
 needs_calculix = pytest.mark.skipif(
@@ -76,7 +76,7 @@ def deck_of(mesh, bodies, sets=(), surfaces=(), types=TYPES):
     for body in bodies:
         for name, rows in mesh.split(mesh.cell_groups[body]).items():
             lines.append(f"*ELEMENT, TYPE={types[name]}, ELSET={body}")
-            faces = [corners_of_facets(name)[facet] for facet in element_type(types[name]).faces]
+            faces = [list(elements.get(name).facets[facet]) for facet in element_type(types[name]).faces]
             for row in rows:
                 number = len(cells) + 1
                 cells[number] = (faces, mesh.cells[name][row])

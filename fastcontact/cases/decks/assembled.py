@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import LONGEST_QUOTED, Location, Row, key_of, look_up
-from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, Surface, SurfaceEntry
+from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Surface, SurfaceEntry
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.mesh import elements, topology
@@ -34,26 +34,14 @@ class Element:
     scope: str
     number: int
     cell: Cell
-    type: ElementType | None
+    type: Any  # ElementType
     points: tuple[int, ...]
     row: int = -1
-    section: Section | None = None
-
-    @property
-    def solid(self) -> ElementType:
-        """The element type of a solid."""
-        assert self.type is not None
-        return self.type
-
-    @property
-    def assigned_section(self) -> Section:
-        """The section of a solid, after the check that all solids have one."""
-        assert self.section is not None
-        return self.section
+    section: Any = None  # Section
 
     def face(self, facet: int) -> Face:
         """Return the face of a solid that is the facet of its mesh element with this index."""
-        reference = elements.get(self.solid.element)
+        reference = elements.get(self.type.element)
         return Face(reference.facet_elements[facet], tuple(self.points[i] for i in reference.facets[facet]), self)
 
 
@@ -126,7 +114,7 @@ class Assembly:
     @cached_property
     def kinematics(self) -> str:
         """Kinematics of the solids."""
-        return self.solids[0].solid.kinematics
+        return self.solids[0].type.kinematics
 
     @property
     def dim(self) -> int:
@@ -307,7 +295,7 @@ class Assembly:
         """The solids by type of mesh element, each at index `row`."""
         elements: dict[str, list[Element]] = {}
         for element in self.solids:
-            elements.setdefault(element.solid.element, []).append(element)
+            elements.setdefault(element.type.element, []).append(element)
         return elements
 
     @cached_property

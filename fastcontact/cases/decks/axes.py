@@ -99,7 +99,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
         axes_of_element = frame_of.get(id(element), default)
         if axes_of_element is None:
             raise block.error(f"element {element.number} has no axes, and there is no default line without an element")
-        frames[starts[element.solid.element] + element.row] = axes_of_element
+        frames[starts[element.type.element] + element.row] = axes_of_element
     return frames
 
 

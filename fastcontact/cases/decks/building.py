@@ -10,19 +10,15 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
-from fastcontact.cases.decks import interactions
+from fastcontact.cases.decks import constraints, interactions, loads, meshing
 from fastcontact.cases.decks.assembled import Element, qualified
 from fastcontact.cases.decks.axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.blocks import errors_at, key_of, look_up
 from fastcontact.cases.decks.conditions import Component, Conditions
-from fastcontact.cases.decks.constraints import add_rotation_points, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
-from fastcontact.cases.decks.fields import add_initial_stresses
 from fastcontact.cases.decks.gaps import GAP_TOLERANCE, add_gap_facets, add_gaps, add_springs
 from fastcontact.cases.decks.histories import Period, ShapeGroups
-from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
-from fastcontact.cases.decks.meshing import check_nodes, deck_mesh_of, group_of_surface
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
 from fastcontact.cases.decks.steps import MOST_INCREMENTS
 from fastcontact.contact.integration import all_nodes_carry_pressure
@@ -67,17 +63,18 @@ class Building:
 
     def __init__(self, content: Content, case_text: str) -> None:
         self.content = content
-        self.assembly = deck_mesh_of(content)
+        self.assembly = meshing.deck_mesh_of(content)
         only_heat = content.heat == "uncoupled"
         if not only_heat:
-            add_rotation_points(self.assembly)
+            constraints.add_rotation_points(self.assembly)
         materials, self.thickness = self._materials()
         self.sections = sections_by_point(self.assembly)
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
         conditions.record()
-        loads = distributed_loads(self.assembly, conditions.loads) + distributed_loads(self.assembly, conditions.fluxes)
-        loads += heat_loads(self.assembly, conditions, self.thickness)
+        adders = loads.distributed_loads(self.assembly, conditions.loads)
+        adders += loads.distributed_loads(self.assembly, conditions.fluxes)
+        adders += loads.heat_loads(self.assembly, conditions, self.thickness)
         gaps = [] if only_heat else add_gap_facets(self.assembly)
         mesh = self.assembly.mesh()
         mesh = mesh if only_heat else cut_sections(self.assembly, mesh, self.sections.values())
@@ -89,12 +86,12 @@ class Building:
         self.local_supports: list[MultiPointConstraint] = []
         self.prescribed_motions: dict[tuple[int, int], Table] = {}
         if only_heat:
-            all_points = point_group(self.model, self.assembly, "held", range(mesh.n_points))
+            all_points = loads.point_group(self.model, self.assembly, "held", range(mesh.n_points))
             self.model.fix(all_points, "xyz"[: mesh.dim])
             add_sectors(self.model, self.assembly)
         else:
             self._add_mechanics(conditions)
-        for add in loads:
+        for add in adders:
             add(self.model)
         self._add_contact()
         self.gap_ends = add_gaps(self.model, self.assembly, gaps, conditions)
@@ -103,12 +100,12 @@ class Building:
     def _add_mechanics(self, conditions: Conditions) -> None:
         """Add supports, constraints, loads, temperatures and springs to the model."""
         self._add_supports(conditions)
-        self.model.relations += [*self.local_supports, *relations_of(self.assembly, self.model.mesh)]
+        self.model.relations += [*self.local_supports, *constraints.relations_of(self.assembly, self.model.mesh)]
         add_sections(self.model, self.assembly, self.sections, conditions)
         add_sectors(self.model, self.assembly)
-        add_forces(self.model, self.assembly, conditions, self.thickness)
-        add_temperatures(self.model, conditions.given_temperatures)
-        add_initial_stresses(self.model, self.assembly)
+        loads.add_forces(self.model, self.assembly, conditions, self.thickness)
+        loads.add_temperatures(self.model, conditions.given_temperatures)
+        loads.add_initial_stresses(self.model, self.assembly)
         add_springs(self.model, self.assembly, self.thickness)
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
@@ -142,13 +139,13 @@ class Building:
             raise cell.error(f"{count} ({missing[0].number}){set_text} has no section, so no material")
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.assembly.solids:
-            section = element.assigned_section
-            key = (key_of(section.material), key_of(section.orientation), element.solid.incompatible_modes)
+            section = element.section
+            key = (key_of(section.material), key_of(section.orientation), element.type.incompatible_modes)
             by_material.setdefault(key, []).append(element)
         materials = []
         for (name, orientation, incompatible_modes), members in by_material.items():
             material = self.content.materials[name]
-            axes = self._axes(members[0].assigned_section, members)
+            axes = self._axes(members[0].section, members)
             group = f"material {material.name}" + (f" along {orientation.lower()}" if orientation else "")
             group += " with incompatible modes" if incompatible_modes else ""
             law = law_of(self.content, material, axes, incompatible_modes)
@@ -174,7 +171,7 @@ class Building:
         """Raise CaseError if a pair is defined twice or has an undefined surface or interaction."""
         pair_names: set[str] = set()
         for pair in self.content.pairs:
-            check_nodes(self.assembly, pair.secondary, pair.location)
+            meshing.check_nodes(self.assembly, pair.secondary, pair.location)
             self.assembly.faces(pair.primary, pair.location)
             if not pair.tied:
                 look_up("surface interaction", pair.interaction, self.content.interactions, pair)
@@ -207,13 +204,13 @@ class Building:
                     by_shape.add(axis, table, [point])
         self.local_supports += local_supports
         for axis, points, value, table in by_shape:
-            group = point_group(self.model, self.assembly, "support", points)
+            group = loads.point_group(self.model, self.assembly, "support", points)
             if callable(value) or any(factor for _, factor in table):
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
             else:
                 self.model.fix(group, "xyz"[axis])
         if self.assembly.dim == 2 and (rotations := self.assembly.rotations.values()):
-            self.model.fix(point_group(self.model, self.assembly, "rotation", rotations), "y")
+            self.model.fix(loads.point_group(self.model, self.assembly, "rotation", rotations), "y")
 
     def _temporary_support(
         self, conditions: Conditions, table: Table, period: Period, components: Sequence[Component]
@@ -234,7 +231,9 @@ class Building:
     def _add_contact(self) -> None:
         """Add the contact pairs and ties of the deck."""
         for pair in self.content.pairs:
-            secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
+            secondary, primary = (
+                meshing.group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary)
+            )
             with errors_at(pair):
                 options = self._pair_options(pair)
                 if secondary in self.assembly.excluded:
@@ -243,7 +242,7 @@ class Building:
 
     def _node_based_options(self, pair: Pair, secondary: str) -> dict[str, Any]:
         """Return the options that exclude nodes from contact: those on the facets, but not in the node-based surface."""
-        excluded = point_group(self.model, self.assembly, "without contact", self.assembly.excluded[secondary])
+        excluded = loads.point_group(self.model, self.assembly, "without contact", self.assembly.excluded[secondary])
         options: dict[str, Any] = {"excluded": excluded}
         if all(map(all_nodes_carry_pressure, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
@@ -279,7 +278,7 @@ class Building:
         """
         if not (pair.adjust or glued) and pair.clearance is None:
             return {}
-        secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
+        secondary, primary = (meshing.group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
         gaps, positions = nodal_gaps(self.model, secondary, primary, self.assembly.excluded.get(secondary, []))
         tolerance = GAP_TOLERANCE * float(np.ptp(self.model.mesh.points, axis=0).max())
         if glued:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from fastcontact.cases.decks.assembled import Face, Target, targets
+from fastcontact.cases.decks.assembled import Assembly, Face, Target, targets
 from fastcontact.cases.decks.axes import local_directions
 from fastcontact.cases.decks.blocks import Block, Location, Row
-from fastcontact.cases.decks.fields import initial_temperatures, reference_temperature, temperature_of
 from fastcontact.cases.decks.histories import Histories, Value
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -53,7 +53,9 @@ class Conditions:
 
     def __init__(self, assembly: DeckMesh) -> None:
         self.assembly, content = assembly, assembly.content
-        initial = initial_temperatures(assembly, content.blocks["INITIAL TEMPERATURE"])
+        lines = (row for block in content.blocks["INITIAL TEMPERATURE"] for row in block.iter_rows())
+        temperatures = (temperature_of(assembly, row) for row in lines)
+        initial = {point: value for points, value, _ in temperatures for point in points}  # the last value applies
         self.reference = reference_temperature(assembly, initial) if content.heat else 0.0
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
@@ -229,3 +231,30 @@ class Conditions:
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:
             return (point, axis, False), float(np.sign(direction[axis]))
         return (point, number, True), 1.0
+
+
+def temperature_of(assembly: Assembly, row: Row) -> tuple[list[int], float, Location]:
+    """Return the points, the temperature and the location of a data line."""
+    if any(row.entries[2:]):
+        raise row.error("temperature gradients exist in beams and shells only: give a single temperature")
+    value = row.number(1)
+    return assembly.nodes(row.text(0), row.location), value, row.location
+
+
+def reference_temperature(assembly: Assembly, initial: Mapping[int, float]) -> float:
+    """Return the initial temperature of the solids, or zero if it is not uniform and has no effect.
+
+    Raises CaseError if it is not uniform and a coupled step computes thermal strains.
+    """
+    content = assembly.content
+    values = {initial.get(point, 0.0) for point in assembly.solid_points}
+    if len(values) == 1:
+        return values.pop()
+    location = content.blocks["INITIAL TEMPERATURE"][0].location
+    if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
+        raise location.error(
+            f"initial temperatures from {min(values):g} to {max(values):g} are not supported with thermal expansion in "
+            "coupled steps: thermal strains refer to a single temperature"
+        )
+    content.note(location, "no effect: initial temperatures differ, and steady temperatures do not depend on them")
+    return 0.0

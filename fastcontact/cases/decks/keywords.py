@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from fastcontact.cases.decks import axes, constraints, fields, geometry, interactions, materials, steps
+from fastcontact.cases.decks import axes, constraints, geometry, interactions, materials, steps
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 
@@ -126,7 +126,7 @@ TRANSLATED = {
     "CYCLIC SYMMETRY MODEL": Keyword("model", store, "N; TIE", "NGRAPH; CHECK; ELSET"),
     "EQUATION": Keyword("model", store),
     "GAP": Keyword("model", store, "ELSET"),
-    "INITIAL CONDITIONS": Keyword("model", fields.initial_conditions, "TYPE"),
+    "INITIAL CONDITIONS": Keyword("model", steps.initial_conditions, "TYPE"),
     "MPC": Keyword("model", constraints.multi_point),
     "PHYSICAL CONSTANTS": Keyword("model", ignore_with_note("no effect: there is no radiation"), ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", store, "SURFACE; NODE"),
@@ -282,5 +282,5 @@ def read_content(blocks: Iterable[Block]) -> Content:
         raise reader.step.error("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:
         raise reader.coupling.error("*KINEMATIC or *DISTRIBUTING must follow")
-    fields.check_steps(reader.content)
+    steps.check_steps(reader.content)
     return reader.content

@@ -1,4 +1,4 @@
-"""Loads of the model of a deck: forces, pressures, body forces, given temperatures and heat loads, from their histories.
+"""Loads of the model of a deck: forces, pressures, body forces, temperatures, heat loads and initial stresses.
 
 Loads on cells and facets need groups of the mesh. The functions for these loads create the groups before the mesh exists, and
 return functions that add the loads to the model later.
@@ -18,6 +18,7 @@ from fastcontact.cases.decks.blocks import key_of
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.histories import Histories, Period, ShapeGroups
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.mesh.mesh import starts_of
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 from fastcontact.round_off import ROUND_OFF
@@ -97,7 +98,7 @@ def _density(deck_mesh: DeckMesh, element: Element, load: Target) -> float:
     """Return the factor of a body force at an element: the density of its material, or 1 for a force per volume."""
     if load.kind[0] == "B":
         return 1.0
-    material = deck_mesh.content.materials[key_of(element.assigned_section.material)]
+    material = deck_mesh.content.materials[key_of(element.section.material)]
     if material.density is None:
         raise load.location.error(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
     return material.density
@@ -205,3 +206,39 @@ def _absolute_temperature(value: Any, reference: float) -> Any:
         return np.asarray(value(points) + reference)
 
     return absolute if callable(value) else value + reference
+
+
+# Stress components in the order of a data line, by the dimension of the mesh.
+STRESS_ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
+
+
+def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
+    """Add the initial stresses to a model; the last of several lines for an element applies.
+
+    Raises CaseError if a line does not have exactly one value per component, or if an element is not a solid or has an
+    orientation.
+    """
+    content, names = deck_mesh.content, STRESS_ORDER[deck_mesh.dim]
+    if not content.blocks["INITIAL STRESS"]:
+        return
+    starts = starts_of(model.mesh.solids)
+    values = np.zeros((sum(map(len, model.mesh.solids.values())), len(names)))
+    for block in content.blocks["INITIAL STRESS"]:
+        for row in block.iter_rows():
+            if len(row.entries) != 1 + len(names):
+                raise row.error(
+                    f"{len(row.entries)} entries, but {1 + len(names)} are needed: an element or a set, and the components "
+                    f"{', '.join(names)} of its stress; stresses by integration point are not supported"
+                )
+            numbers = [row.number(index) for index in range(1, 1 + len(names))]
+            for element in deck_mesh.elements_of(row.text(0), row.location):
+                if element.type is None:
+                    raise row.error(f"element {element.number} is not a solid, so it has no initial stress")
+                if element.section is not None and element.section.orientation:
+                    raise row.error(
+                        f"element {element.number} has an *ORIENTATION: initial stresses in local axes are not supported"
+                    )
+                values[starts[element.type.element] + element.row] = numbers
+    components: dict[str, Any] = {name: values[:, [k]] for k, name in enumerate(names) if values[:, k].any()}
+    if components:
+        model.add_initial_stress(**components)

@@ -116,15 +116,15 @@ def deck_mesh_of(content: Content) -> DeckMesh:
     deck_mesh = DeckMesh(content)
     if not deck_mesh.solids:
         raise content.steps[0].error("the deck has no solid elements")
-    first = deck_mesh.solids[0].solid
+    first = deck_mesh.solids[0].type
     for element in deck_mesh.solids:
-        if element.solid.kinematics != first.kinematics:
+        if element.type.kinematics != first.kinematics:
             raise element.cell.error(
-                f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
+                f"elements of type {element.type.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
-        if element.solid.heat_only and content.heat != "uncoupled":
+        if element.type.heat_only and content.heat != "uncoupled":
             raise element.cell.error(
-                f"elements of type {element.solid.name} conduct heat alone: they need *HEAT TRANSFER in all steps"
+                f"elements of type {element.type.name} conduct heat alone: they need *HEAT TRANSFER in all steps"
             )
     points = deck_mesh.points
     if deck_mesh.dim == 2 and np.ptp(points[:, 2]) > PLANE_TOLERANCE * np.ptp(points[:, :2]):

@@ -1,4 +1,4 @@
-"""Keywords of steps: *STEP and its procedures, *AMPLITUDE, and the storage of supports and loads."""
+"""Keywords of steps: *STEP and its procedures, *AMPLITUDE, supports, loads and initial conditions; and checks of steps."""
 
 from __future__ import annotations
 
@@ -113,3 +113,35 @@ def amplitude(content: Content, block: Block) -> None:
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
         raise block.error(f"amplitude '{name}' needs pairs of time and multiplier, with ascending times")
     content.amplitudes[key_of(name)] = Amplitude(block.location, name, tuple(times), tuple(values), total_time)
+
+
+def initial_conditions(content: Content, block: Block) -> None:
+    """Store a block *INITIAL CONDITIONS, which gives nodal temperatures or element stresses before the first step."""
+    kind = " ".join(block.required("TYPE").upper().split())
+    if kind not in ("TEMPERATURE", "STRESS"):
+        raise block.error(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
+    content.blocks[f"INITIAL {kind}"].append(block)
+
+
+# Keywords of heat loads.
+HEAT_LOADS = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
+
+
+def check_steps(content: Content) -> None:
+    """Raise CaseError if the procedures or the loads of the steps are inconsistent."""
+    first = next((step for step in content.steps if step.heat), None)
+    for number, step in enumerate(content.steps):
+        if first and step.heat != first.heat and (first.heat == "uncoupled" or number > content.steps.index(first)):
+            raise step.error(
+                "*HEAT TRANSFER cannot be combined with other procedures, and *COUPLED TEMPERATURE-DISPLACEMENT cannot "
+                "precede them: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
+            )
+        for block in step.conditions:
+            if block.keyword in HEAT_LOADS and not step.heat:
+                raise block.error("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
+            if block.keyword == "TEMPERATURE" and first:
+                raise block.error("temperatures are computed in this deck: prescribe degree of freedom 11 by *BOUNDARY")
+            if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "uncoupled":
+                raise block.error(
+                    "is not a heat load: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
+                )
