@@ -69,7 +69,7 @@ class NodalField(Protocol):
 
     def traction(self, force: Array) -> Array:
         """Return nodal tractions (n_nodes, dim) [pressure] for forces (m, dim) [force], like `side_pressure`."""
-        return np.column_stack([self.side_pressure(component) for component in force.T])
+        return np.column_stack(list(map(self.side_pressure, force.T)))
 
     def side_pressure(self, force: Array) -> Array:
         """Return nodal pressures (n_nodes,) [pressure] per unit of the complete area of each node.

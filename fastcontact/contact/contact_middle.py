@@ -153,7 +153,12 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
         Gaps; the middle of an open contact is where the gap is smallest [length].
     """
     surface, points = pair.secondary, pair.points[pair.secondary.points]
-    weight = _weights(force, gap)
+    # Weights of the nodes for the centre of pressure; magnitudes if tension nearly cancels or exceeds compression.
+    weight = force if float(force.sum()) > 1e-6 * float(np.abs(force).sum()) else np.abs(force)
+    if (total := float(weight.sum())) > 0:
+        weight = weight / total
+    else:
+        weight = (np.arange(len(gap)) == np.argmin(gap)).astype(float)
     mean = weight @ normal
     dim = points.shape[1]
     meets_axis = np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max()
@@ -173,7 +178,7 @@ def _middle_in_3d(points: Array, weight: Array, planes: list[tuple[Array, Indice
     """Return the middle on a surface in 3D.
 
     Parallel planes of symmetry at two opposite ends represent an infinite surface. The parameters are the positions (n_nodes,
-    3) of the nodes [length], their `_weights`, the `planes` of symmetry, and the weighted `mean` (3,) of the normals.
+    3) of the nodes [length], their weights, the `planes` of symmetry, and the weighted `mean` (3,) of the normals.
     """
     centre, unpaired, ignored = weight @ points, list[tuple[Array, float]](), list[Array]()
     for axis, nodes in planes:
@@ -197,16 +202,6 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
         return True
     steps, tolerance = np.diff(line.nodes[:, 0]), LENGTH_ROUND_OFF * float(np.ptp(line.nodes, axis=0).max())
     return bool(steps.min() >= -tolerance or steps.max() <= tolerance)
-
-
-def _weights(force: Array, gap: Array) -> Array:
-    """Return the weights (n_nodes,) of the nodes for the centre of pressure, whose sum is 1 [-]."""
-    weight = force
-    if float(force.sum()) <= 1e-6 * float(np.abs(force).sum()):  # if tension nearly cancels or exceeds compression
-        weight = np.abs(force)
-    if (total := float(weight.sum())) > 0:
-        return np.asarray(weight / total)
-    return (np.arange(len(gap)) == np.argmin(gap)).astype(float)
 
 
 def _middle_in_2d(

@@ -189,28 +189,32 @@ class ContactSides:
             added[rows] += np.einsum("nk,nk->n", shape, config.wear_depth[nodes])
         return added
 
-    def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
+    def smoothing_overlap(
+        self, candidates: Candidates, pairing: Pairing, smoothing: Smoothing, config: Configuration
+    ) -> Array:
         """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length].
 
-        They are zero without `smoothing`.
+        The candidates belong to facets.
         """
+        assert candidates.facet is not None
+        assert candidates.xi is not None
         overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
-        if self.smoothing is None or candidates.facet is None or candidates.xi is None:
-            return overlap
         on_secondary = candidates.facet[rows], candidates.xi[rows]
         on_primary = pairing.facet[rows], pairing.xi[rows]
-        overlap[rows] = self.smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
+        overlap[rows] = smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
         return overlap
 
-    def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
+    def smoothing_slope(
+        self, candidates: Candidates, pairing: Pairing, rows: Indices, config: Configuration
+    ) -> Array | None:
         """Return the derivatives (n, dim - 1) of `smoothing_overlap` with respect to primary reference coordinates [length].
 
-        `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
-        zero on the straight extensions of facets, and None without `smoothing`.
+        `rows` (n,) are numbers of candidates. The derivatives are zero on the straight extensions of facets, and None without
+        `smoothing`.
         """
         if self.smoothing is None or candidates.facet is None:
             return None
-        axes = self.smoothing.frames(deformed)
+        axes = self.smoothing.frames(self.points + config.displacement)
         factor = self.smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
         slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
@@ -260,7 +264,8 @@ class ContactSides:
         nodes = self.node_candidates
         pairing = self.pair_candidates(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
         G, gap0 = gap_rows(relative_motion(nodes, pairing, self.primary, len(self.points)), pairing, self.points)
-        gap0 -= self.smoothing_overlap(nodes, pairing, config)
+        if self.smoothing is not None:
+            gap0 -= self.smoothing_overlap(nodes, pairing, self.smoothing, config)
         if with_clearance:
             gap0 += self.added_gap(nodes, pairing, config)
         u = config.displacement if displacement is None else displacement

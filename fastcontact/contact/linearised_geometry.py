@@ -82,35 +82,6 @@ def transverse(normal: Array, vector: Array) -> Array:
     return np.asarray(vector - np.einsum("nd,nd->n", normal, vector)[:, None] * normal)
 
 
-class NodalWeights(NamedTuple):
-    """Sparse matrix whose n rows contain the weights of k nodes each, for products with a few vectors.
-
-    The products are those of a `csr_array`, whose construction would take longer than the products.
-
-    Attributes
-    ----------
-    values : ndarray (n, k)
-        The weights [-].
-    nodes : ndarray of int (n, k)
-        The nodes, in ascending order in each row.
-    """
-
-    values: Array
-    nodes: NDArray[np.integer]
-
-    def product(self, nodal: Array) -> Array:
-        """Return the weighted sums (n, dim) of a nodal field (n_points, dim)."""
-        return np.einsum("nk,nkd->nd", self.values, nodal[self.nodes])
-
-    def transposed_product(self, forces: Array, n_points: int) -> Array:
-        """Return the nodal forces (n_points, dim) of forces (n, dim) at the points."""
-        dim = forces.shape[1]
-        columns = self.nodes[:, :, None] * dim + np.arange(dim)
-        weighted = self.values[:, :, None] * forces[:, None]
-        total = np.bincount(columns.ravel(), weighted.ravel(), n_points * dim)
-        return np.asarray(total, float).reshape(n_points, dim)
-
-
 class Variation(NamedTuple):
     """Variation of the projections of n points.
 
@@ -118,8 +89,9 @@ class Variation(NamedTuple):
     ----------
     xi : ndarray (n, dim - 1)
         Variation of the reference coordinates of the primary points that the points face [-].
-    motion : NodalWeights
-        Variation of the matrix `motion` (n, n_points) of the points [-].
+    weights, nodes : ndarray (n, k), ndarray of int (n, k)
+        Variation of the matrix `motion` (n, n_points) of the points, given by the weights of k nodes in each row [-]. The
+        nodes are in ascending order. Products with these arrays take less time than the construction of a `csr_array`.
     foot : ndarray (n, dim)
         Variation of the positions of these primary points, on the smooth surface if there is one, due to that of xi, with
         fixed facets [length].
@@ -128,9 +100,22 @@ class Variation(NamedTuple):
     """
 
     xi: Array
-    motion: NodalWeights
+    weights: Array
+    nodes: NDArray[np.integer]
     foot: Array
     normal: Array
+
+    def motion(self, nodal: Array) -> Array:
+        """Return the products (n, dim) of the variation of `motion` with a nodal field (n_points, dim)."""
+        return np.einsum("nk,nkd->nd", self.weights, nodal[self.nodes])
+
+    def nodal_forces(self, forces: Array, n_points: int) -> Array:
+        """Return the products (n_points, dim) of the transposed variation with forces (n, dim) at the points [force]."""
+        dim = forces.shape[1]
+        columns = self.nodes[:, :, None] * dim + np.arange(dim)
+        weighted = self.weights[:, :, None] * forces[:, None]
+        total = np.bincount(columns.ravel(), weighted.ravel(), n_points * dim)
+        return np.asarray(total, float).reshape(n_points, dim)
 
 
 class _SurfacePoints:
@@ -180,7 +165,7 @@ class _SurfacePoints:
         self._feet, ascending = feet, np.argsort(feet.nodes, axis=1)
         self._facing_nodes = np.take_along_axis(feet.nodes, ascending, axis=1)
         self._weight_gradient = -np.take_along_axis(feet.gradient, ascending[:, :, None], axis=1)
-        self.axes = self._slopes(coordinates)
+        self.axes = np.swapaxes(feet.gradient, 1, 2) @ coordinates[feet.nodes]
         self.offset = self.motion @ coordinates
         self.normal, self.averaged = pairing.normal[rows], None
         self._normal_gradient = np.zeros_like(self.axes)
@@ -226,18 +211,12 @@ class _SurfacePoints:
         """Dual vectors (n, dim - 1, dim) of the tangent vectors `axes` [1 / length]."""
         return np.asarray(np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes))
 
-    def _slopes(self, values: Array) -> Array:
-        """Return the derivatives (n, dim - 1, dim) of a nodal field (n_points, dim) at the facing points.
-
-        They are those with respect to the reference coordinates of the facets.
-        """
-        return np.asarray(np.swapaxes(self._feet.gradient, 1, 2) @ values[self._feet.nodes])
-
     def variation(self, du: Array) -> Variation:
         """Return the variation of projections and normals for a variation `du` (n_points, dim) of displacements [length]."""
         relative_motion, d_facet_normal = self.motion @ du, np.zeros_like(self.normal)
         if self._facet_normal is not None:
-            tilt = np.einsum("nid,nd->ni", self._slopes(du), self._facet_normal)
+            slopes = np.swapaxes(self._feet.gradient, 1, 2) @ du[self._feet.nodes]
+            tilt = np.einsum("nid,nd->ni", slopes, self._facet_normal)
             d_facet_normal = -np.einsum("nid,ni->nd", self._dual_axes, tilt)
         at_fixed_xi = d_facet_normal if self._has_facet_normals else np.zeros_like(d_facet_normal)
         if self.averaged is not None:
@@ -245,8 +224,10 @@ class _SurfacePoints:
         d_direction = d_facet_normal if self._closest else at_fixed_xi
         xi = np.einsum("nid,nd->ni", self._inverse, relative_motion - self._gap * d_direction)
         foot = np.einsum("nid,ni->nd", self._foot_gradient, xi)
-        motion = NodalWeights(np.einsum("nki,ni->nk", self._weight_gradient, xi), self._facing_nodes)
-        return Variation(xi, motion, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi))
+        weights = np.einsum("nki,ni->nk", self._weight_gradient, xi)
+        return Variation(
+            xi, weights, self._facing_nodes, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi)
+        )
 
     def stiffness(self, force: Array) -> csr_array:
         r"""Return the stiffness (n_dofs, n_dofs) of constant normal forces (n,) [force] at the points [force / length].
@@ -306,8 +287,8 @@ class _ObstaclePoints:
         motion = self.motion @ du
         normal = np.einsum("nde,ne->nd", self._gradient, motion)
         foot = transverse(self.normal, motion) - self._gap * normal
-        no_nodes = NodalWeights(np.zeros((len(normal), 0)), np.zeros((len(normal), 0), int))
-        return Variation(np.zeros((len(normal), 0)), no_nodes, foot, normal)
+        no_weights, no_nodes = np.zeros((len(normal), 0)), np.zeros((len(normal), 0), int)
+        return Variation(no_weights, no_weights, no_nodes, foot, normal)
 
     def stiffness(self, force: Array) -> csr_array:
         """See `_SurfacePoints.stiffness`."""
@@ -487,11 +468,11 @@ class Slips:
         normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
             Normals of the constraints, their variation, and the variation of the primary normals of `closing` [-].
         """
-        motion, (normal, d_normal, d_primary) = d_points.motion.product(self.motion), normals
+        motion, (normal, d_normal, d_primary) = d_points.motion(self.motion), normals
         d_slip, d_closing = _weighted(weights, motion), np.zeros_like(normal)
         if self.closing is not None:
             if self.closing.along_mean:
-                d_opening = _weighted(weights, d_points.motion.product(self.start))
+                d_opening = _weighted(weights, d_points.motion(self.start))
             else:  # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
                 d_opening = -d_slip - _weighted(weights, d_points.foot)
             d_closing = self.closing.variation(du, (normal, d_normal), d_primary, d_opening)
@@ -581,7 +562,7 @@ class LinearisedPoints:
             d_gaps = np.zeros((len(d_gaps), count))
             d_gaps[:, rows] = d_paired_gaps
         nodal_forces = self.points.motion.T @ self._at_points(d_force, d_tangential)
-        return nodal_forces + d_points.motion.transposed_product(force, len(nodal_forces)), d_gaps
+        return nodal_forces + d_points.nodal_forces(force, len(nodal_forces)), d_gaps
 
     @cached_property
     def _solution(self) -> tuple[Array, Array, Array]:

@@ -190,7 +190,7 @@ def pair(
         paired = closest.overhang <= np.where(at_smooth_end, max(projection_tolerance, OVERHANG), projection_tolerance)
         overhangs = paired & ~at_smooth_end & (closest.overhang > LENGTH_ROUND_OFF)
         pairing = Pairing(closest.facet, closest.xi, closest.normal, paired)
-        return _with_overhang(pairing, candidates, primary, overhangs)
+        return _with_overhang(pairing, candidates, primary, overhangs) if overhangs.any() else pairing
     at_nodes = primary.smooth_normals
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
@@ -200,7 +200,8 @@ def pair(
         normal = _round_edges(primary, facet, xi, normal)
     paired = overhang <= projection_tolerance
     overhangs = paired & (overhang > LENGTH_ROUND_OFF)
-    return _with_overhang(Pairing(facet, xi, normal, paired), candidates, primary, overhangs)
+    pairing = Pairing(facet, xi, normal, paired)
+    return _with_overhang(pairing, candidates, primary, overhangs) if overhangs.any() else pairing
 
 
 def _round_edges(primary: DeformedSide, facet: Indices, xi: Array, mean: Array) -> Array:
@@ -230,8 +231,6 @@ def _round_edges(primary: DeformedSide, facet: Indices, xi: Array, mean: Array) 
 def _with_overhang(pairing: Pairing, candidates: Array, primary: DeformedSide, overhangs: Mask) -> Pairing:
     """Return the pairing with the overhang, `Pairing.beyond`, of the candidates that the mask `overhangs` (n,) marks."""
     rows = np.flatnonzero(overhangs)
-    if not len(rows):
-        return pairing
     feet = facet_points(primary.surface, pairing.facet[rows], pairing.xi[rows])
     nodes = primary.coordinates[feet.nodes]
     offset = candidates[rows] - np.einsum("nk,nkd->nd", feet.shape, nodes)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._tools.neighbours import nearest
-from fastcontact.arrays import AnyArray, Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Linearised, MultiplierCompliance
@@ -141,7 +141,8 @@ class Formulation(ContactSides, ABC):
         if has_penalty and self.options.cohesion is None:
             constraints = self._with_penalties(constraints, config)
         if config.elastic_slip is not None and constraints.tangents:
-            previous_slip = _values_at(config.elastic_slip, constraints.positions)
+            positions, values = config.elastic_slip
+            previous_slip = values[nearest(positions, constraints.positions)[1]]
             elastic_slip = -np.einsum("kmd,md->km", np.stack(constraints.directions), previous_slip)
             constraints = replace(constraints, elastic_slip=elastic_slip)
         if self.options.kind == "gap_only":
@@ -152,7 +153,8 @@ class Formulation(ContactSides, ABC):
             distance = np.minimum(np.abs(constraints.gaps(config.displacement)), np.abs(constraints.gaps(config.start)))
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
-            initial_gap = _values_at(self._initial_gaps, constraints.positions)
+            positions, gaps = self._initial_gaps
+            initial_gap = gaps[nearest(positions, constraints.positions)[1]]
             body_stiffness = self.modulus / self.shortest_edge
             return cohesive_rows(self.options.cohesion, constraints, config, initial_gap, body_stiffness)
         equality = self.never_opening(constraints.positions, config)
@@ -230,7 +232,8 @@ class Formulation(ContactSides, ABC):
         always_closed = self.options.kind in ALWAYS_CLOSED
         if always_closed or config.never_opening is None:
             return np.full(len(positions), always_closed)
-        return np.asarray(_values_at(config.never_opening, positions))
+        known_positions, values = config.never_opening
+        return np.asarray(values[nearest(known_positions, positions)[1]])
 
     def assembled(
         self, candidates: Candidates, pairing: Pairing, compliance: MultiplierCompliance | None, config: Configuration
@@ -241,19 +244,22 @@ class Formulation(ContactSides, ABC):
         """
         motion = relative_motion(candidates, pairing, self.primary, len(self.points))
         B, gap0 = gap_rows(motion, pairing, self.points)
-        gap0 += self.added_gap(candidates, pairing, config) - self.smoothing_overlap(candidates, pairing, config)
+        added_gap = self.added_gap(candidates, pairing, config)
+        if self.smoothing is not None:
+            added_gap -= self.smoothing_overlap(candidates, pairing, self.smoothing, config)
+        gap0 += added_gap
         constraints = Constraints(B, gap0, candidates.positions(self.points), compliance)
         directions: tuple[Array, ...] = ()
         if self.has_tangents:
             projectors = None
-            if self.friction and self.held_motions is not None and len(self.held_motions.nodes):
+            if self.friction and self.held_motions is not None and len(self.held_nodes):
                 # Projectors onto the directions in which all nodes of a candidate are held.
                 held = np.einsum("nk,nkde->nde", candidates.shape, self.held_motions.projectors_at(candidates.nodes))
                 projectors = eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
             axes = tangents(pairing.normal, projectors)
             friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
             slip0 = self.slip_at_rest(candidates, pairing, slip_axes, config)
-            rows = tuple([rows_of(motion, axis) for axis in slip_axes])
+            rows = tuple(map(partial(rows_of, motion), slip_axes))
             constraints = replace(constraints, tangents=rows, directions=directions, friction=friction, slip0=slip0)
         if self.normals == "secondary":  # derivatives are not implemented
             return constraints
@@ -271,7 +277,7 @@ class Formulation(ContactSides, ABC):
         if self.linearised_at_mean:
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.pair_candidates(candidates, config, np.inf)
-        slope = self.smoothing_slope(candidates, pairing, rows, self.points + config.displacement)
+        slope = self.smoothing_slope(candidates, pairing, rows, config)
         options = self.primary, self.points, config, self.normals
         points = paired_points(candidates, pairing, rows, *options, slope=slope)
         if self.linearised_at_mean:
@@ -311,12 +317,3 @@ class Formulation(ContactSides, ABC):
                 rotation_gradient = unit_motions[1:] - unit_motions[0]
         slip_data = directions, tangential, total, increment, self.points + config.start
         return Slips(*slip_data, rotation_gradient=rotation_gradient)
-
-
-def _values_at(points_and_values: tuple[Array, AnyArray], positions: Array) -> AnyArray:
-    """Return the values (m, ...) at the known points nearest to `positions` (m, dim).
-
-    `points_and_values` are the k known points (k, dim) [length], and their values (k, ...).
-    """
-    points, values = points_and_values
-    return np.asarray(values[nearest(points, positions)[1]])

@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import DeformedSide, facet_normals
+from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -72,7 +72,8 @@ def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:
         if flip:
             facets = facets[:, list(elements.get(name).reversed)]
         blocks.append(FacetBlock(name, np.ascontiguousarray(facets), np.searchsorted(points, facets)))
-        lengths = np.linalg.norm(facet_normals(blocks[-1], mesh.points), axis=2)
+        side = Surface(group, (blocks[-1],), points, np.zeros(len(points)))
+        lengths = np.linalg.norm(DeformedSide(side, mesh.points).facet_normals, axis=2)
         degenerate = np.flatnonzero(~(lengths.min(axis=1) > 0.0))
         if len(degenerate):
             raise ContactError(
