@@ -50,11 +50,6 @@ class UnrolledLine:
         """Total length of the line [length]."""
         return float(self.abscissa[-1])
 
-    def point_at(self, length: float) -> Array:
-        """Return the point (2,) at an arc length along the line [length]."""
-        x, y = self.nodes.T
-        return np.array([np.interp(length, self.abscissa, x), np.interp(length, self.abscissa, y)])
-
     def lengths(self, positions: Array) -> Array:
         """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
         segments = np.stack([self.nodes[:-1], self.nodes[1:]], axis=1)
@@ -218,11 +213,11 @@ def _middle_in_2d(
         size = float(np.ptp(points, axis=0).max())
         line = UnrolledLine(centre + np.outer([-size, size], tangent), np.array([0.0, 2.0 * size]))
     lengths = line.lengths(points)
+    start, backward, direction = float(weight @ lengths), False, tangent if length > FACING else None
     if len(planes) == 1 and not line.closed:
-        axis, on_plane = planes[0]
+        direction, on_plane = planes[0]
         ends = lengths[on_plane]  # both ends of a half ring lie on the plane
-        start = float(ends[np.argmin(np.abs(ends - weight @ lengths))])
+        start = float(ends[np.argmin(np.abs(ends - start))])
         backward = start > 0.5 * (lengths.min() + lengths.max())
-        return ContactMiddle(line.point_at(start), line, start, backward, tangent=axis)
-    start = float(weight @ lengths)
-    return ContactMiddle(line.point_at(start), line, start, tangent=tangent if length > FACING else None)
+    position = np.array([np.interp(start, line.abscissa, line.nodes[:, axis]) for axis in range(2)])
+    return ContactMiddle(position, line, start, backward, tangent=direction)

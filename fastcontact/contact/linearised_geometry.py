@@ -30,6 +30,7 @@ from scipy.sparse import csr_array
 from fastcontact._tools.records import record, replace
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, tangents
 from fastcontact.contact.projection import DeformedSide, facet_points
@@ -159,7 +160,7 @@ class _SurfacePoints:
         self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: DeformedSide, normals: object,
         closest: bool, slope: Array | None,
     ) -> None:  # fmt: skip
-        feet, coordinates, facet = pairing.projections(primary.surface, rows), primary.coordinates, pairing.facet[rows]
+        feet, coordinates, facet = pairing.extended_feet(rows), primary.coordinates, pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
         self.motion = shapes_at(shape, nodes, len(coordinates))
         self._feet, ascending = feet, np.argsort(feet.nodes, axis=1)
@@ -518,9 +519,9 @@ class LinearisedPoints:
     slip_normals : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
         Primary normals of the slips, and their derivatives with respect to reference coordinates, if they differ from the
         normals of the points [-].
-    compliance : Callable, optional
-        Function from forces (m, dim) [force] to elastic displacements (m, dim) of the constraints [length], if the compliance
-        couples vectors. Their components along normals and tangents change as these rotate.
+    compliance : (Projection, (ndarray, ndarray) or None), optional
+        Compliance that couples the force vectors of the constraints of the pair, and its axes, see `PressureField.axes`. The
+        components of elastic displacements along normals and tangents change as these rotate.
     """
 
     side: Surface
@@ -533,12 +534,12 @@ class LinearisedPoints:
     slips: Slips | None = None
     rows_in_pair: tuple[Indices, int] | None = None
     slip_normals: tuple[InterpolatedNormals, Array] | None = None
-    compliance: Callable[[Array], Array] | None = None
+    compliance: tuple[Projection, tuple[Array, Array] | None] | None = None
 
     def derivatives_along(self, du: Array) -> tuple[Array, Array]:
         """See `constraints.Linearised`."""
         (tangential, force, elastic), d_points = self._solution, self.points.variation(du)
-        d_normal = self._normal_variation(du, d_points.normal)
+        d_normal = d_points.normal if self.tests is None else self._normal_variation(du, d_points.normal)
         d_gaps = np.einsum("md,md->m", _weighted(self.functions, self.points.offset), d_normal)[None]
         d_gaps -= np.einsum("md,md->m", self.normal, _weighted(self.functions, d_points.foot))
         d_force, d_tangential = self.multiplier[:, None] * d_normal, np.zeros_like(d_normal)
@@ -552,7 +553,7 @@ class LinearisedPoints:
             d_slips = self.slips.variation(du, d_points, self.points, self.functions, normals)
             d_tangential = -np.einsum("md,md->m", tangential, d_normal)[:, None] * self.normal
             if self.compliance is not None:
-                d_elastic, T = self.compliance(d_force + d_tangential), self.slips.tangents
+                d_elastic, T = self._elastic_displacements(d_force + d_tangential), self.slips.tangents
                 d_gaps += np.einsum("md,md->m", d_normal, elastic) + np.einsum("md,md->m", self.normal, d_elastic)
                 normal_part = np.einsum("md,md->m", self.normal, elastic)
                 d_slips += np.einsum("kmd,md->km", T, d_elastic) - np.einsum("kmd,md->km", T, d_normal) * normal_part
@@ -573,8 +574,18 @@ class LinearisedPoints:
         normal, tangential = self.multiplier[:, None] * self.normal, np.zeros_like(self.normal)
         if self.slips is not None:
             tangential = np.einsum("nk,knd->nd", self.slips.forces, self.slips.tangents)
-        elastic = np.zeros_like(normal) if self.compliance is None else self.compliance(normal + tangential)
+        elastic = np.zeros_like(normal) if self.compliance is None else self._elastic_displacements(normal + tangential)
         return tangential, self._at_points(normal, tangential), elastic
+
+    def _elastic_displacements(self, force: Array) -> Array:
+        """Return the elastic displacements (m, dim) of the constraints [length] under forces (m, dim) [force]."""
+        assert self.compliance is not None
+        assert self.rows_in_pair is not None
+        (projection, axes), (rows, count) = self.compliance, self.rows_in_pair
+        forces = np.zeros((count, force.shape[1]))
+        forces[rows] = force if axes is None else np.einsum("mde,md->me", axes[0][rows], force)
+        displacements = projection.apply(forces)[rows]
+        return displacements if axes is None else np.einsum("mde,me->md", axes[0][rows], displacements)
 
     def _at_points(self, normal: Array, tangential: Array) -> Array:
         """Return the forces (n, dim) at the points for normal and tangential forces (m, dim) of the constraints [force]."""
@@ -591,9 +602,7 @@ class LinearisedPoints:
         return np.where(length > 0.0, length, 1.0)
 
     def _normal_variation(self, du: Array, at_points: Array) -> Array:
-        """Return the variation (m, dim) of the normals of the constraints, given the variation (n, dim) at the points."""
-        if self.tests is None:
-            return _weighted(self.functions, at_points)
+        """Return the variation (m, dim) of mean or separate normals, given the variation (n, dim) of those of the points."""
         if isinstance(self.separate_normals, DeformedSide):
             return -self.separate_normals.variation(du)
         if self.separate_normals is not None:

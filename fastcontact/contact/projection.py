@@ -65,8 +65,9 @@ def facet_points(side: Surface, facet: Indices, xi: Array) -> FacetPoints:
     """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) in the facets numbered `facet` (n,)."""
     nodes = side.all_facets[facet]
     shape, gradient = np.zeros(nodes.shape), np.zeros((*nodes.shape, xi.shape[1]))
-    for block, (rows, _) in zip(side.blocks, by_block(facet, side.sizes), strict=True):
+    for block, first in zip(side.blocks, side.offsets):
         element, n = elements.get(block.element), block.facets.shape[1]
+        rows = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
         shape[rows, :n], gradient[rows, :n] = element.shape(xi[rows]), element.gradient(xi[rows])
     return FacetPoints(nodes, side.all_local[facet], shape, gradient)
 

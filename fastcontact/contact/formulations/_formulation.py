@@ -242,14 +242,13 @@ class Formulation(ContactSides, ABC):
 
         The `compliance`, if any, is `Constraints.compliance`.
         """
-        motion = relative_motion(candidates, pairing, self.primary, len(self.points))
+        motion = relative_motion(candidates, pairing, len(self.points))
         B, gap0 = gap_rows(motion, pairing, self.points)
         added_gap = self.added_gap(candidates, pairing, config)
         if self.smoothing is not None:
             added_gap -= self.smoothing_overlap(candidates, pairing, self.smoothing, config)
         gap0 += added_gap
-        constraints = Constraints(B, gap0, candidates.positions(self.points), compliance)
-        directions: tuple[Array, ...] = ()
+        directions, options = tuple[Array, ...](), dict[str, Any]()
         if self.has_tangents:
             projectors = None
             if self.friction and self.held_motions is not None and len(self.held_nodes):
@@ -260,10 +259,10 @@ class Formulation(ContactSides, ABC):
             friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
             slip0 = self.slip_at_rest(candidates, pairing, slip_axes, config)
             rows = tuple(map(partial(rows_of, motion), slip_axes))
-            constraints = replace(constraints, tangents=rows, directions=directions, friction=friction, slip0=slip0)
-        if self.normals == "secondary":  # derivatives are not implemented
-            return constraints
-        return replace(constraints, geometry=partial(self._linearised_points, candidates, pairing, config, directions))
+            options = {"tangents": rows, "directions": directions, "friction": friction, "slip0": slip0}
+        if self.normals != "secondary":  # whose derivatives are not implemented
+            options["geometry"] = partial(self._linearised_points, candidates, pairing, config, directions)
+        return Constraints(B, gap0, candidates.positions(self.points), compliance, **options)
 
     def _linearised_points(
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array],
@@ -277,7 +276,9 @@ class Formulation(ContactSides, ABC):
         if self.linearised_at_mean:
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.pair_candidates(candidates, config, np.inf)
-        slope = self.smoothing_slope(candidates, pairing, rows, config)
+        slope = (
+            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
+        )
         options = self.primary, self.points, config, self.normals
         points = paired_points(candidates, pairing, rows, *options, slope=slope)
         if self.linearised_at_mean:
@@ -292,7 +293,7 @@ class Formulation(ContactSides, ABC):
             return replace(linearised, slips=slips)
         averaged, slip_normals = points.averaged, None
         if averaged is None:
-            feet, primary = pairing.projections(self.primary, rows), config.deformed(self.primary, self.points)
+            feet, primary = pairing.extended_feet(rows), config.deformed(self.primary, self.points)
             averaged = InterpolatedNormals(primary, feet.local, feet.shape, primary.smooth_normals[pairing.facet[rows]])
             slip_normals = averaged, averaged.gradient(feet.gradient)
         local = self.number_on_side[candidates.nodes[rows]]

@@ -335,7 +335,9 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), primary, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        slope = self.smoothing_slope(candidates, pairing, rows, config)
+        slope = (
+            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
+        )
         options = self.primary, self.points, config
         points = paired_points(candidates, pairing, rows, *options, normals, True, slope)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
