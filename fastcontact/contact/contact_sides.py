@@ -14,6 +14,7 @@ from fastcontact.contact.held_motions import HeldMotions, reflected, symmetry_pl
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import (
+    FACING,
     OVERHANG,
     Candidates,
     Normals,
@@ -23,7 +24,6 @@ from fastcontact.contact.pairing import (
     pair,
     relative_motion,
     tangents,
-    with_secondary_normals,
 )
 from fastcontact.contact.projection import SMALL_OVERHANG, interpolate
 from fastcontact.contact.surface import Surface
@@ -128,7 +128,10 @@ class ContactSides:
         pairing = pair(positions, primary, largest_overhang, self.normals, config.pose, config.rounded)
         if self.normals != "secondary":
             return pairing
-        return with_secondary_normals(pairing, self._secondary_normals(candidates, config))
+        normals = self._secondary_normals(candidates, config)
+        is_facing = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
+        normal = np.where(is_facing[:, None], -normals, pairing.normal)
+        return replace(pairing, normal=normal, paired=pairing.paired & is_facing)
 
     @cached_property
     def number_on_side(self) -> Indices:

@@ -385,9 +385,3 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     if isinstance(primary, RigidSide) and result not in ("facet", "averaged"):
         raise ContactError(f"normals = {normals!r} are for contact between bodies: a rigid obstacle has its own")
     return result
-
-
-def with_secondary_normals(pairing: Pairing, normals: Array) -> Pairing:
-    """Return the pairing with the opposites of secondary `normals` (n, dim); candidates that face away become unpaired."""
-    valid = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
-    return replace(pairing, normal=np.where(valid[:, None], -normals, pairing.normal), paired=pairing.paired & valid)
