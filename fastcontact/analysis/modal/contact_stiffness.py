@@ -13,7 +13,7 @@ from fastcontact.analysis.modal.held_contact import configuration_of
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.integration import areas_of_rule, fine_rule
-from fastcontact.contact.linearised_geometry import paired_points
+from fastcontact.contact.linearised_projections import paired_points
 from fastcontact.contact.pairing import Candidates
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult

@@ -18,13 +18,8 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Linearised, MultiplierCompliance
 from fastcontact.contact.contact_sides import ContactSides
 from fastcontact.contact.held_motions import eigenspaces, without_complete_facets
-from fastcontact.contact.linearised_geometry import (
-    ClosingMotion,
-    InterpolatedNormals,
-    LinearisedPoints,
-    Slips,
-    paired_points,
-)
+from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, Slips
+from fastcontact.contact.linearised_projections import InterpolatedNormals, paired_points
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
