@@ -69,7 +69,7 @@ class NodalField(Protocol):
 
     def traction(self, force: Array) -> Array:
         """Return nodal tractions (n_nodes, dim) [pressure] for forces (m, dim) [force], like `side_pressure`."""
-        return np.column_stack([self.side_pressure(component) for component in force.T])
+        return np.column_stack(list(map(self.side_pressure, force.T)))
 
     def side_pressure(self, force: Array) -> Array:
         """Return nodal pressures (n_nodes,) [pressure] per unit of the complete area of each node.
@@ -183,6 +183,9 @@ class Tied(Protocol):
         """
 
 
+_SCALARS = "friction", "equality", "softness", "wear_softness", "tangential_softness", "prescribed"
+
+
 @record
 class Constraints:
     """Contact constraints ``gap0 + B u + C multiplier >= 0`` with multipliers >= 0, or equations.
@@ -278,10 +281,8 @@ class Constraints:
 
     def __post_init__(self) -> None:
         k, m = len(self.tangents), len(self.gap0)
-        shapes: dict[str, tuple[int, ...]] = {"low_rank_compliance": (1 + k, m, 0)}
-        shapes |= dict.fromkeys(("slip0", "elastic_slip"), (k, m))
-        scalars = "friction", "equality", "softness", "wear_softness", "tangential_softness", "prescribed"
-        shapes |= dict.fromkeys(scalars, (m,))
+        shapes: dict[str, tuple[int, ...]] = dict.fromkeys(_SCALARS, (m,))
+        shapes |= {"slip0": (k, m), "elastic_slip": (k, m), "low_rank_compliance": (1 + k, m, 0)}
         for name, shape in shapes.items():
             if not (values := getattr(self, name)).size:
                 object.__setattr__(self, name, np.zeros(shape, values.dtype))

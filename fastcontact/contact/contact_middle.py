@@ -49,11 +49,6 @@ class UnrolledLine:
     abscissa: Array
     period: float = 0.0
 
-    def point_at(self, length: float) -> Array:
-        """Return the point (2,) at an arc length along the line [length]."""
-        x, y = self.nodes.T
-        return np.array([np.interp(length, self.abscissa, x), np.interp(length, self.abscissa, y)])
-
     def lengths(self, positions: Array) -> Array:
         """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
         segments = np.stack([self.nodes[:-1], self.nodes[1:]], axis=1)
@@ -168,7 +163,12 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
             crossed.append((int(first[0]), int(second[0]), rotation))
             points[moved] = points[first[0]] + (points[moved] - points[second[0]]) @ rotation
             normal[moved] = normal[moved] @ rotation
-    weight = _weights(force, gap)
+    # Weights of the nodes for the centre of pressure; magnitudes if tension nearly cancels or exceeds compression.
+    weight = force if float(force.sum()) > 1e-6 * float(np.abs(force).sum()) else np.abs(force)
+    if (total := float(weight.sum())) > 0:
+        weight = weight / total
+    else:
+        weight = (np.arange(len(gap)) == np.argmin(gap)).astype(float)
     mean = weight @ normal
     dim = points.shape[1]
     meets_axis = np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max()
@@ -203,7 +203,7 @@ def _middle_in_3d(points: Array, weight: Array, planes: list[tuple[Array, Indice
     """Return the middle on a surface in 3D.
 
     Parallel planes of symmetry at two opposite ends represent an infinite surface. The parameters are the positions (n_nodes,
-    3) of the nodes [length], their `_weights`, the `planes` of symmetry, and the weighted `mean` (3,) of the normals.
+    3) of the nodes [length], their weights, the `planes` of symmetry, and the weighted `mean` (3,) of the normals.
     """
     centre, unpaired, ignored = weight @ points, list[tuple[Array, float]](), list[Array]()
     for axis, nodes in planes:
@@ -229,16 +229,6 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
     return bool(steps.min() >= -tolerance or steps.max() <= tolerance)
 
 
-def _weights(force: Array, gap: Array) -> Array:
-    """Return the weights (n_nodes,) of the nodes for the centre of pressure, whose sum is 1 [-]."""
-    weight = force
-    if float(force.sum()) <= 1e-6 * float(np.abs(force).sum()):  # if tension nearly cancels or exceeds compression
-        weight = np.abs(force)
-    if (total := float(weight.sum())) > 0:
-        return np.asarray(weight / total)
-    return (np.arange(len(gap)) == np.argmin(gap)).astype(float)
-
-
 def _middle_in_2d(
     surface: Surface, coordinates: Array, points: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array,
     crossed: list[tuple[int, int, Array]],
@@ -254,17 +244,22 @@ def _middle_in_2d(
     if line is None:
         size = float(np.ptp(coordinates[surface.points], axis=0).max())
         line = UnrolledLine(centre + np.outer([-size, size], tangent), np.array([0.0, 2.0 * size]))
-    lengths = line.lengths(coordinates[surface.points])
-    for first, second, _ in crossed[:1]:
+    lengths, direction, backward = (
+        line.lengths(coordinates[surface.points]),
+        tangent if length > FACING else None,
+        False,
+    )
+    start = float(weight @ lengths)
+    if crossed:
+        first, second, _ = crossed[0]
         jump = float(lengths[first] - lengths[second])
         start = float(weight @ (lengths + jump * (points != coordinates[surface.points]).any(axis=1)))
         start -= 0.0 if 0.0 <= start <= line.abscissa[-1] else jump
-        return ContactMiddle(line.point_at(start), replace(line, period=abs(jump)), start)
-    if len(planes) == 1 and not line.period:
-        axis, on_plane = planes[0]
+        line, direction = replace(line, period=abs(jump)), None
+    elif len(planes) == 1 and not line.period:
+        direction, on_plane = planes[0]
         ends = lengths[on_plane]  # both ends of a half ring lie on the plane
-        start = float(ends[np.argmin(np.abs(ends - weight @ lengths))])
+        start = float(ends[np.argmin(np.abs(ends - start))])
         backward = start > 0.5 * (lengths.min() + lengths.max())
-        return ContactMiddle(line.point_at(start), line, start, backward, tangent=axis)
-    start = float(weight @ lengths)
-    return ContactMiddle(line.point_at(start), line, start, tangent=tangent if length > FACING else None)
+    position = np.array([np.interp(start, line.abscissa, line.nodes[:, axis]) for axis in range(2)])
+    return ContactMiddle(position, line, start, backward, tangent=direction)

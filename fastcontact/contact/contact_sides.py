@@ -14,6 +14,7 @@ from fastcontact.contact.held_motions import HeldMotions, reflected, symmetry_pl
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import (
+    FACING,
     OVERHANG,
     Candidates,
     Normals,
@@ -23,9 +24,8 @@ from fastcontact.contact.pairing import (
     pair,
     relative_motion,
     tangents,
-    with_secondary_normals,
 )
-from fastcontact.contact.projection import SMALL_OVERHANG, facet_points, interpolate
+from fastcontact.contact.projection import SMALL_OVERHANG, interpolate
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.errors import ContactError, unknown
@@ -128,7 +128,10 @@ class ContactSides:
         pairing = pair(positions, primary, largest_overhang, self.normals, config.pose, config.rounded)
         if self.normals != "secondary":
             return pairing
-        return with_secondary_normals(pairing, self._secondary_normals(candidates, config))
+        normals = self._secondary_normals(candidates, config)
+        is_facing = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
+        normal = np.where(is_facing[:, None], -normals, pairing.normal)
+        return replace(pairing, normal=normal, paired=pairing.paired & is_facing)
 
     @cached_property
     def number_on_side(self) -> Indices:
@@ -157,11 +160,10 @@ class ContactSides:
         if isinstance(self.primary, RigidSide):
             obstacle_motion = self.rigid_motion(candidates.positions, config)
             return -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
-        slip0, rows = np.zeros((len(directions), len(pairing.paired))), np.flatnonzero(pairing.paired)
+        slip0, rows = np.zeros((len(directions), len(pairing.paired))), pairing.rows
         if self.slip != "symmetric":
             return slip0
-        start = self.points + config.start
-        feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
+        start, feet = self.points + config.start, pairing.feet
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         primary = config.deformed(self.primary, self.points)
         mean = interpolate(primary.smooth_normals[pairing.facet[rows]], feet)
@@ -177,42 +179,44 @@ class ContactSides:
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
-        added, rows, options = np.zeros(len(candidates.nodes)), np.flatnonzero(pairing.paired), self.options
+        added, rows, options = np.zeros(len(candidates.nodes)), pairing.rows, self.options
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         if options.clearance is not None and len(rows):
             added[rows] += options.clearance(np.einsum("nk,nkd->nd", shape, self.points[nodes]))
         if options.clearance_primary is not None and isinstance(self.primary, Surface) and len(rows):
-            feet = facet_points(self.primary, pairing.facet[rows], pairing.xi[rows])
-            added[rows] += options.clearance_primary(np.einsum("nk,nkd->nd", feet.shape, self.points[feet.nodes]))
+            feet_positions = np.einsum("nk,nkd->nd", pairing.feet.shape, self.points[pairing.feet.nodes])
+            added[rows] += options.clearance_primary(feet_positions)
         added *= config.clearance_factor
         if config.wear_depth is not None:
             added[rows] += np.einsum("nk,nk->n", shape, config.wear_depth[nodes])
         return added
 
-    def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
+    def smoothing_overlap(
+        self, candidates: Candidates, pairing: Pairing, smoothing: Smoothing, config: Configuration
+    ) -> Array:
         """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length].
 
-        They are zero without `smoothing`.
+        The candidates belong to facets.
         """
-        overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
-        if self.smoothing is None or candidates.facet is None or candidates.xi is None:
-            return overlap
+        assert candidates.facet is not None
+        assert candidates.xi is not None
+        overlap, rows = np.zeros(len(pairing.paired)), pairing.rows
         on_secondary = candidates.facet[rows], candidates.xi[rows]
         on_primary = pairing.facet[rows], pairing.xi[rows]
-        overlap[rows] = self.smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
+        overlap[rows] = smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
         return overlap
 
-    def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
+    def smoothing_slope(
+        self, candidates: Candidates, pairing: Pairing, rows: Indices, smoothing: Smoothing, config: Configuration
+    ) -> Array:
         """Return the derivatives (n, dim - 1) of `smoothing_overlap` with respect to primary reference coordinates [length].
 
-        `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
-        zero on the straight extensions of facets, and None without `smoothing`.
+        `rows` (n,) are numbers of candidates. The derivatives are zero on the straight extensions of facets.
         """
-        if self.smoothing is None or candidates.facet is None:
-            return None
-        axes = self.smoothing.frames(deformed)
-        factor = self.smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
-        slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
+        assert candidates.facet is not None
+        axes = smoothing.frames(self.points + config.displacement)
+        factor = smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
+        slope = factor * smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
     def rigid_motion(self, positions: Callable[[Array], Array], config: Configuration) -> Array:
@@ -259,8 +263,9 @@ class ContactSides:
         """
         nodes = self.node_candidates
         pairing = self.pair_candidates(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
-        G, gap0 = gap_rows(relative_motion(nodes, pairing, self.primary, len(self.points)), pairing, self.points)
-        gap0 -= self.smoothing_overlap(nodes, pairing, config)
+        G, gap0 = gap_rows(relative_motion(nodes, pairing, len(self.points)), pairing, self.points)
+        if self.smoothing is not None:
+            gap0 -= self.smoothing_overlap(nodes, pairing, self.smoothing, config)
         if with_clearance:
             gap0 += self.added_gap(nodes, pairing, config)
         u = config.displacement if displacement is None else displacement
@@ -274,7 +279,7 @@ class ContactSides:
         nodes = self.node_candidates
         pairing = self.pair_candidates(nodes, config, np.inf)
         directions = tangents(pairing.normal)
-        motion = relative_motion(nodes, pairing, self.primary, len(self.points))
+        motion = relative_motion(nodes, pairing, len(self.points))
         slip0, increment = (
             self.slip_at_rest(nodes, pairing, directions, config),
             (config.displacement - config.start).ravel(),

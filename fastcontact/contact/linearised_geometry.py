@@ -21,303 +21,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact._tools.records import record, replace
+from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, Pairing, tangents
-from fastcontact.contact.projection import DeformedSide, facet_points
+from fastcontact.contact.linearised_projections import InterpolatedNormals, Points, Variation, transverse
+from fastcontact.contact.multiplier_field import Projection
+from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.surface import Surface
-from fastcontact.linear.sparse_rows import nodal_rows, rows_of, scaled, shapes_at
-from fastcontact.round_off import DIFFERENCE_STEP, TINY
-
-
-class InterpolatedNormals:
-    """Unit normals at n points, interpolated from nodal normals at fixed reference coordinates, and their variation.
-
-    Parameters
-    ----------
-    side : DeformedSide
-    local : ndarray of int (n, k)
-        Nodes of the facet of each point, numbered on the side.
-    shape : ndarray (n, k)
-        Values of their shape functions at the point [-].
-    at_nodes : ndarray (n, k, dim), optional
-        Normals at these nodes, which differ from `DeformedSide.nodal_normals` at corners [-].
-
-    Attributes
-    ----------
-    normal : ndarray (n, dim)
-        Unit normals at the points [-].
-    """
-
-    def __init__(self, side: DeformedSide, local: Indices, shape: Array, at_nodes: Array | None = None) -> None:
-        self._at_nodes = side.nodal_normals[local] if at_nodes is None else at_nodes
-        mean = np.einsum("nk,nkd->nd", shape, self._at_nodes)
-        self._length = np.linalg.norm(mean, axis=1, keepdims=True)
-        self.normal, self._side = mean / self._length, side
-        self._to_points = shapes_at(shape, local, len(side.surface.points))
-
-    def gradient(self, shape_gradient: Array) -> Array:
-        """Return the derivatives (n, dim - 1, dim) of the normals with respect to the reference coordinates of facets [-].
-
-        `shape_gradient` (n, k, dim - 1) contains the derivatives of the shape functions [-].
-        """
-        slope = np.einsum("nki,nkd->nid", shape_gradient, self._at_nodes) / self._length[:, None]
-        return np.asarray(slope - np.einsum("nid,nd->ni", slope, self.normal)[:, :, None] * self.normal[:, None])
-
-    def variation(self, du: Array) -> Array:
-        """Return the variation (n, dim) of the normals [-] for a variation `du` (n_points, dim) of displacements [length]."""
-        return transverse(self.normal, self._to_points @ self._side.variation(du)) / self._length
-
-
-def transverse(normal: Array, vector: Array) -> Array:
-    """Return the components of vectors (n, dim) perpendicular to unit vectors (n, dim)."""
-    return np.asarray(vector - np.einsum("nd,nd->n", normal, vector)[:, None] * normal)
-
-
-class NodalWeights(NamedTuple):
-    """Sparse matrix whose n rows contain the weights of k nodes each, for products with a few vectors.
-
-    The products are those of a `csr_array`, whose construction would take longer than the products.
-
-    Attributes
-    ----------
-    values : ndarray (n, k)
-        The weights [-].
-    nodes : ndarray of int (n, k)
-        The nodes, in ascending order in each row.
-    """
-
-    values: Array
-    nodes: NDArray[np.integer]
-
-    def product(self, nodal: Array) -> Array:
-        """Return the weighted sums (n, dim) of a nodal field (n_points, dim)."""
-        return np.einsum("nk,nkd->nd", self.values, nodal[self.nodes])
-
-    def transposed_product(self, forces: Array, n_points: int) -> Array:
-        """Return the nodal forces (n_points, dim) of forces (n, dim) at the points."""
-        dim = forces.shape[1]
-        columns = self.nodes[:, :, None] * dim + np.arange(dim)
-        weighted = self.values[:, :, None] * forces[:, None]
-        total = np.bincount(columns.ravel(), weighted.ravel(), n_points * dim)
-        return np.asarray(total, float).reshape(n_points, dim)
-
-
-class Variation(NamedTuple):
-    """Variation of the projections of n points.
-
-    Attributes
-    ----------
-    xi : ndarray (n, dim - 1)
-        Variation of the reference coordinates of the primary points that the points face [-].
-    motion : NodalWeights
-        Variation of the matrix `motion` (n, n_points) of the points [-].
-    foot : ndarray (n, dim)
-        Variation of the positions of these primary points, on the smooth surface if there is one, due to that of xi, with
-        fixed facets [length].
-    normal : ndarray (n, dim)
-        Variation of the normals [-].
-    """
-
-    xi: Array
-    motion: NodalWeights
-    foot: Array
-    normal: Array
-
-
-class _SurfacePoints:
-    """Secondary points paired with a meshed side, and the variation of their projections and normals.
-
-    The facing point of a secondary point is the primary point that it faces.
-
-    Parameters
-    ----------
-    candidates : Candidates
-    pairing : Pairing
-        Pairing of the candidates with the primary side.
-    rows : ndarray of int (n,)
-        Numbers of the points in `candidates`.
-    primary : DeformedSide
-        The primary side in the configuration of the pairing.
-    normals : str or tuple of float
-        Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
-    closest : bool
-        Whether points face the closest points on the primary side, instead of projections along the normals. Both coincide
-        for facet normals.
-    slope : ndarray (n, dim - 1), optional
-        Derivatives of the heights of a smooth primary surface above its facets with respect to reference coordinates, see
-        `surface_smoothing` [length].
-
-    Attributes
-    ----------
-    motion : csr_array (n, n_points)
-        Map from nodal vectors to the differences of their values at the points and at the facing points [-].
-    offset : ndarray (n, dim)
-        Vectors from the facing points to the points [length].
-    axes : ndarray (n, dim - 1, dim)
-        Tangent vectors of the primary facets at the facing points [length].
-    normal : ndarray (n, dim)
-        Normals of the primary side at the facing points [-].
-    averaged : InterpolatedNormals or None
-        Averaged normals; None with other normals.
-    """
-
-    def __init__(
-        self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: DeformedSide, normals: object,
-        closest: bool, slope: Array | None,
-    ) -> None:  # fmt: skip
-        feet, coordinates, facet = pairing.projections(primary.surface, rows), primary.coordinates, pairing.facet[rows]
-        nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
-        self.motion = shapes_at(shape, nodes, len(coordinates))
-        self._feet, ascending = feet, np.argsort(feet.nodes, axis=1)
-        self._facing_nodes = np.take_along_axis(feet.nodes, ascending, axis=1)
-        self._weight_gradient = -np.take_along_axis(feet.gradient, ascending[:, :, None], axis=1)
-        self.axes = self._slopes(coordinates)
-        self.offset = self.motion @ coordinates
-        self.normal, self.averaged = pairing.normal[rows], None
-        self._normal_gradient = np.zeros_like(self.axes)
-        self._facet_normal: Array | None = None  # None if neither the normals nor the projections depend on it
-        if normals == "facet" or closest:
-            self._facet_normal = self.normal
-            facet_gradient = self._facet_normal_gradient(primary, facet, pairing.xi[rows])
-        if normals == "facet":
-            self._normal_gradient = facet_gradient
-        elif isinstance(normals, str):
-            self.averaged = InterpolatedNormals(primary, feet.local, feet.shape, primary.smooth_normals[facet])
-            self.normal, self._normal_gradient = self.averaged.normal, self.averaged.gradient(feet.gradient)
-        else:
-            self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
-        # Let a_i be the tangent vectors, n the direction of the projection, g the distance along n, and dv the variation of
-        # the displacements of the points relative to the facing points. Then ``a_i dxi_i + g dn = dv`` up to a multiple of n.
-        # The products with the tangents perpendicular to n eliminate this multiple.
-        direction, gradient = self.normal, self._normal_gradient
-        if closest:
-            direction, gradient = pairing.normal[rows], facet_gradient
-        frame = np.stack(tangents(direction), axis=1)
-        self._closest, self._has_facet_normals = closest, normals == "facet"
-        self._gap = np.einsum("nd,nd->n", self.offset, direction)[:, None]
-        inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * gradient))
-        self._inverse = inverse @ frame
-        self._foot_gradient = self.axes if slope is None else self.axes + slope[:, :, None] * self.normal[:, None]
-
-    def _facet_normal_gradient(self, primary: DeformedSide, facet: Indices, xi: Array) -> Array:
-        """Return the derivatives (n, dim - 1, dim) of facet normals with respect to reference coordinates [-]."""
-        if primary.surface.order == 1 and xi.shape[1] == 1:
-            return np.zeros_like(self.axes)  # straight lines
-        # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
-        steps = 0.5 * np.eye(xi.shape[1])
-        above, below = (
-            [facet_points(primary.surface, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0)
-        )
-        second = np.stack(above, axis=3) - np.stack(below, axis=3)
-        curvature = np.einsum("nkij,nkd,nd->nij", second, primary.coordinates[self._feet.nodes], self.normal)
-        return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
-
-    @cached_property
-    def _dual_axes(self) -> Array:
-        """Dual vectors (n, dim - 1, dim) of the tangent vectors `axes` [1 / length]."""
-        return np.asarray(np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes))
-
-    def _slopes(self, values: Array) -> Array:
-        """Return the derivatives (n, dim - 1, dim) of a nodal field (n_points, dim) at the facing points.
-
-        They are those with respect to the reference coordinates of the facets.
-        """
-        return np.asarray(np.swapaxes(self._feet.gradient, 1, 2) @ values[self._feet.nodes])
-
-    def variation(self, du: Array) -> Variation:
-        """Return the variation of projections and normals for a variation `du` (n_points, dim) of displacements [length]."""
-        relative_motion, d_facet_normal = self.motion @ du, np.zeros_like(self.normal)
-        if self._facet_normal is not None:
-            tilt = np.einsum("nid,nd->ni", self._slopes(du), self._facet_normal)
-            d_facet_normal = -np.einsum("nid,ni->nd", self._dual_axes, tilt)
-        at_fixed_xi = d_facet_normal if self._has_facet_normals else np.zeros_like(d_facet_normal)
-        if self.averaged is not None:
-            at_fixed_xi = self.averaged.variation(du)
-        d_direction = d_facet_normal if self._closest else at_fixed_xi
-        xi = np.einsum("nid,nd->ni", self._inverse, relative_motion - self._gap * d_direction)
-        foot = np.einsum("nid,ni->nd", self._foot_gradient, xi)
-        motion = NodalWeights(np.einsum("nki,ni->nk", self._weight_gradient, xi), self._facing_nodes)
-        return Variation(xi, motion, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi))
-
-    def stiffness(self, force: Array) -> csr_array:
-        r"""Return the stiffness (n_dofs, n_dofs) of constant normal forces (n,) [force] at the points [force / length].
-
-        It contains minus the second variation of the gaps g,
-
-        .. math:: - \delta^2 g = 2 n \cdot \delta y_{,\alpha} \delta \xi^\alpha
-                  - n_{,\alpha} \cdot y_{,\beta} \delta \xi^\alpha \delta \xi^\beta - g |\delta n|^2, \qquad
-                  \delta n = - y^{,\alpha} (n \cdot \delta y_{,\alpha})
-
-        with the dual axes :math:`y^{,\alpha}`, up to products of gap and curvature (Laursen, 2002, section 5.3).
-        """
-        n_dofs, gap, axes = self.motion.shape[1] * self.normal.shape[1], self._gap[:, 0], range(self.axes.shape[1])
-        dual = self._dual_axes
-        metric = np.einsum("nid,njd->nij", dual, dual)
-        curvature = np.einsum("nid,njd->nij", self._normal_gradient, self.axes)
-        slopes = self._feet.gradient[..., None] * self.normal[:, None, None]
-        tilts = [nodal_rows(self._feet.nodes, slopes[:, :, i], n_dofs) for i in axes]
-        xi = [
-            rows_of(self.motion, dual[:, i]) + sum(scaled(tilts[j], gap * metric[:, i, j]) for j in axes) for i in axes
-        ]
-        K = csr_array((n_dofs, n_dofs))
-        for i in axes:
-            K += 2.0 * tilts[i].T @ scaled(xi[i], force)
-            for j in axes:
-                K -= xi[i].T @ scaled(xi[j], force * curvature[:, i, j])
-                K -= tilts[i].T @ scaled(tilts[j], force * gap * metric[:, i, j])
-        return csr_array(0.5 * (K + K.T))
-
-
-class _ObstaclePoints:
-    """Secondary points paired with a rigid obstacle, which has no nodes, and the variation of their normals.
-
-    Parameters
-    ----------
-    secondary : csr_array (n, n_points)
-        Values of the shape functions at the points, by node [-].
-    obstacle : RigidSide
-    coordinates : ndarray (n_points, dim)
-        Coordinates of the pairing [length].
-    pose : Pose
-    """
-
-    def __init__(self, secondary: csr_array, obstacle: RigidSide, coordinates: Array, pose: Pose) -> None:
-        self.averaged = None
-        self.motion, x = secondary, secondary @ coordinates
-        gap, self.normal, paired, _ = obstacle.project(x, pose)
-        self._gap = np.where(paired, gap, 0.0)[:, None]
-        self.offset = self._gap * self.normal
-        step = DIFFERENCE_STEP * float(np.ptp(coordinates, axis=0).max())
-        pairs = [[obstacle.project(x + sign * step * axis, pose)[1] for sign in (1, -1)] for axis in np.eye(x.shape[1])]
-        self._gradient = np.stack([ahead - behind for ahead, behind in pairs], axis=2) / (2.0 * step)
-        self._gradient[~np.isfinite(self._gradient)] = 0.0
-
-    def variation(self, du: Array) -> Variation:
-        """See `_SurfacePoints.variation`; there are no reference coordinates."""
-        motion = self.motion @ du
-        normal = np.einsum("nde,ne->nd", self._gradient, motion)
-        foot = transverse(self.normal, motion) - self._gap * normal
-        no_nodes = NodalWeights(np.zeros((len(normal), 0)), np.zeros((len(normal), 0), int))
-        return Variation(np.zeros((len(normal), 0)), no_nodes, foot, normal)
-
-    def stiffness(self, force: Array) -> csr_array:
-        """See `_SurfacePoints.stiffness`."""
-        rows = [rows_of(self.motion, np.broadcast_to(axis, self.normal.shape)) for axis in np.eye(self.normal.shape[1])]
-        normal_rows = [rows_of(self.motion, self._gradient[:, i]) for i in range(len(rows))]
-        K = -sum(row.T @ scaled(normal_row, force) for row, normal_row in zip(rows, normal_rows, strict=True))
-        return csr_array(0.5 * (K + K.T))
-
-
-Points: TypeAlias = _SurfacePoints | _ObstaclePoints
+from fastcontact.round_off import TINY
 
 
 class ClosingMotion:
@@ -463,12 +177,6 @@ class Slips:
     rotation_gradient: Array | None = None
     substitutions: Sequence[Substitution] = ()
 
-    def with_substitution(self, substitution: Substitution, motion: csr_array) -> Slips:
-        """Return the slips with an additional one; `motion` (n, n_points) is the matrix `motion` of the points."""
-        assert self.closing is not None
-        total = self.total + substitution.slip(self.closing.vector, motion @ self.motion)
-        return replace(self, total=total, substitutions=(*self.substitutions, substitution))
-
     def variation(
         self, du: Array, d_points: Variation, points: Points, weights: csr_array | None,
         normals: tuple[Array, Array, Array],
@@ -487,11 +195,11 @@ class Slips:
         normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
             Normals of the constraints, their variation, and the variation of the primary normals of `closing` [-].
         """
-        motion, (normal, d_normal, d_primary) = d_points.motion.product(self.motion), normals
+        motion, (normal, d_normal, d_primary) = d_points.motion(self.motion), normals
         d_slip, d_closing = _weighted(weights, motion), np.zeros_like(normal)
         if self.closing is not None:
             if self.closing.along_mean:
-                d_opening = _weighted(weights, d_points.motion.product(self.start))
+                d_opening = _weighted(weights, d_points.motion(self.start))
             else:  # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
                 d_opening = -d_slip - _weighted(weights, d_points.foot)
             d_closing = self.closing.variation(du, (normal, d_normal), d_primary, d_opening)
@@ -537,9 +245,9 @@ class LinearisedPoints:
     slip_normals : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
         Primary normals of the slips, and their derivatives with respect to reference coordinates, if they differ from the
         normals of the points [-].
-    compliance : Callable, optional
-        Function from forces (m, dim) [force] to elastic displacements (m, dim) of the constraints [length], if the compliance
-        couples vectors. Their components along normals and tangents change as these rotate.
+    compliance : (Projection, (ndarray, ndarray) or None), optional
+        Compliance that couples the force vectors of the constraints of the pair, and its axes, see `PressureField.axes`. The
+        components of elastic displacements along normals and tangents change as these rotate.
     """
 
     side: Surface
@@ -552,12 +260,12 @@ class LinearisedPoints:
     slips: Slips | None = None
     rows_in_pair: tuple[Indices, int] | None = None
     slip_normals: tuple[InterpolatedNormals, Array] | None = None
-    compliance: Callable[[Array], Array] | None = None
+    compliance: tuple[Projection, tuple[Array, Array] | None] | None = None
 
     def derivatives_along(self, du: Array) -> tuple[Array, Array]:
         """See `constraints.Linearised`."""
         (tangential, force, elastic), d_points = self._solution, self.points.variation(du)
-        d_normal = self._normal_variation(du, d_points.normal)
+        d_normal = d_points.normal if self.tests is None else self._normal_variation(du, d_points.normal)
         d_gaps = np.einsum("md,md->m", _weighted(self.functions, self.points.offset), d_normal)[None]
         d_gaps -= np.einsum("md,md->m", self.normal, _weighted(self.functions, d_points.foot))
         d_force, d_tangential = self.multiplier[:, None] * d_normal, np.zeros_like(d_normal)
@@ -571,7 +279,7 @@ class LinearisedPoints:
             d_slips = self.slips.variation(du, d_points, self.points, self.functions, normals)
             d_tangential = -np.einsum("md,md->m", tangential, d_normal)[:, None] * self.normal
             if self.compliance is not None:
-                d_elastic, T = self.compliance(d_force + d_tangential), self.slips.tangents
+                d_elastic, T = self._elastic_displacements(d_force + d_tangential), self.slips.tangents
                 d_gaps += np.einsum("md,md->m", d_normal, elastic) + np.einsum("md,md->m", self.normal, d_elastic)
                 normal_part = np.einsum("md,md->m", self.normal, elastic)
                 d_slips += np.einsum("kmd,md->km", T, d_elastic) - np.einsum("kmd,md->km", T, d_normal) * normal_part
@@ -581,7 +289,7 @@ class LinearisedPoints:
             d_gaps = np.zeros((len(d_gaps), count))
             d_gaps[:, rows] = d_paired_gaps
         nodal_forces = self.points.motion.T @ self._at_points(d_force, d_tangential)
-        return nodal_forces + d_points.motion.transposed_product(force, len(nodal_forces)), d_gaps
+        return nodal_forces + d_points.nodal_forces(force, len(nodal_forces)), d_gaps
 
     @cached_property
     def _solution(self) -> tuple[Array, Array, Array]:
@@ -592,8 +300,18 @@ class LinearisedPoints:
         normal, tangential = self.multiplier[:, None] * self.normal, np.zeros_like(self.normal)
         if self.slips is not None:
             tangential = np.einsum("nk,knd->nd", self.slips.forces, self.slips.tangents)
-        elastic = np.zeros_like(normal) if self.compliance is None else self.compliance(normal + tangential)
+        elastic = np.zeros_like(normal) if self.compliance is None else self._elastic_displacements(normal + tangential)
         return tangential, self._at_points(normal, tangential), elastic
+
+    def _elastic_displacements(self, force: Array) -> Array:
+        """Return the elastic displacements (m, dim) of the constraints [length] under forces (m, dim) [force]."""
+        assert self.compliance is not None
+        assert self.rows_in_pair is not None
+        (projection, axes), (rows, count) = self.compliance, self.rows_in_pair
+        forces = np.zeros((count, force.shape[1]))
+        forces[rows] = force if axes is None else np.einsum("mde,md->me", axes[0][rows], force)
+        displacements = projection.apply(forces)[rows]
+        return displacements if axes is None else np.einsum("mde,me->md", axes[0][rows], displacements)
 
     def _at_points(self, normal: Array, tangential: Array) -> Array:
         """Return the forces (n, dim) at the points for normal and tangential forces (m, dim) of the constraints [force]."""
@@ -610,9 +328,7 @@ class LinearisedPoints:
         return np.where(length > 0.0, length, 1.0)
 
     def _normal_variation(self, du: Array, at_points: Array) -> Array:
-        """Return the variation (m, dim) of the normals of the constraints, given the variation (n, dim) at the points."""
-        if self.tests is None:
-            return _weighted(self.functions, at_points)
+        """Return the variation (m, dim) of mean or separate normals, given the variation (n, dim) of those of the points."""
         if isinstance(self.separate_normals, DeformedSide):
             return -self.separate_normals.variation(du)
         if self.separate_normals is not None:
@@ -625,19 +341,3 @@ class LinearisedPoints:
         total = np.asarray(self.tests @ vectors)
         self.side.add_across_ends(total)
         return total
-
-
-def paired_points(
-    candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, points: Array,
-    config: Configuration, normals: object, closest: bool = False, slope: Array | None = None,
-) -> Points:  # fmt: skip
-    """Return the paired candidates with the numbers `rows` (n,), and the variation of their projections.
-
-    The pairing was computed in the configuration `config` of the mesh with the undeformed `points` (n_points, dim) [length].
-    `normals`, `closest` and `slope` apply to meshed primary sides, see `_SurfacePoints`.
-    """
-    if not isinstance(primary, RigidSide):
-        deformed = config.deformed(primary, points)
-        return _SurfacePoints(candidates, pairing, rows, deformed, normals, closest, slope)
-    shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(points))
-    return _ObstaclePoints(shapes, primary, points + config.displacement, config.pose)

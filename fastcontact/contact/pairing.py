@@ -6,6 +6,7 @@ Mortar contact in 3D pairs facets with facets instead, see `formulations._cut_fa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -126,6 +127,8 @@ class Pairing:
     beyond : ndarray (n, dim - 1), optional
         Overhang of the candidate beyond the end of the primary surface, in reference coordinates of the facet whose straight
         extension the candidate faces [-]; zero for other candidates, and None if no candidate overhangs.
+    primary : Surface, optional
+        The primary side; None for a rigid obstacle.
     """
 
     facet: Indices
@@ -134,13 +137,26 @@ class Pairing:
     paired: Mask
     offset: Array | None = None
     beyond: Array | None = None
+    primary: Surface | None = None
 
-    def projections(self, primary: Surface, rows: Indices) -> FacetPoints:
-        """Return the projections of the candidates `rows` (q,) onto `primary`.
+    @cached_property
+    def rows(self) -> Indices:
+        """Numbers (q,) of the paired candidates."""
+        return np.flatnonzero(self.paired)
 
-        Candidates beyond the end of the primary surface are projected onto the straight extension of their facet.
+    @cached_property
+    def feet(self) -> FacetPoints:
+        """The projections of the q paired candidates onto the facets of a meshed primary side."""
+        assert self.primary is not None
+        return facet_points(self.primary, self.facet[self.rows], self.xi[self.rows])
+
+    def extended_feet(self, rows: Indices) -> FacetPoints:
+        """Return the projections of the candidates `rows` (n,) onto facets and their straight extensions.
+
+        Candidates beyond the end of the primary surface are projected onto the extension of their facet.
         """
-        feet = facet_points(primary, self.facet[rows], self.xi[rows])
+        assert self.primary is not None
+        feet = facet_points(self.primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
             return feet
         return replace(feet, shape=feet.shape + np.einsum("nkj,nj->nk", feet.gradient, self.beyond[rows]))
@@ -189,8 +205,8 @@ def pair(
         at_smooth_end = _at_smooth_ends(primary, closest)
         paired = closest.overhang <= np.where(at_smooth_end, max(projection_tolerance, OVERHANG), projection_tolerance)
         overhangs = paired & ~at_smooth_end & (closest.overhang > LENGTH_ROUND_OFF)
-        pairing = Pairing(closest.facet, closest.xi, closest.normal, paired)
-        return _with_overhang(pairing, candidates, primary, overhangs)
+        pairing = Pairing(closest.facet, closest.xi, closest.normal, paired, primary=primary.surface)
+        return _with_overhang(pairing, candidates, primary, overhangs) if overhangs.any() else pairing
     at_nodes = primary.smooth_normals
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
@@ -200,7 +216,8 @@ def pair(
         normal = _round_edges(primary, facet, xi, normal)
     paired = overhang <= projection_tolerance
     overhangs = paired & (overhang > LENGTH_ROUND_OFF)
-    return _with_overhang(Pairing(facet, xi, normal, paired), candidates, primary, overhangs)
+    pairing = Pairing(facet, xi, normal, paired, primary=primary.surface)
+    return _with_overhang(pairing, candidates, primary, overhangs) if overhangs.any() else pairing
 
 
 def _round_edges(primary: DeformedSide, facet: Indices, xi: Array, mean: Array) -> Array:
@@ -230,8 +247,6 @@ def _round_edges(primary: DeformedSide, facet: Indices, xi: Array, mean: Array) 
 def _with_overhang(pairing: Pairing, candidates: Array, primary: DeformedSide, overhangs: Mask) -> Pairing:
     """Return the pairing with the overhang, `Pairing.beyond`, of the candidates that the mask `overhangs` (n,) marks."""
     rows = np.flatnonzero(overhangs)
-    if not len(rows):
-        return pairing
     feet = facet_points(primary.surface, pairing.facet[rows], pairing.xi[rows])
     nodes = primary.coordinates[feet.nodes]
     offset = candidates[rows] - np.einsum("nk,nkd->nd", feet.shape, nodes)
@@ -325,15 +340,14 @@ def normals(directions: Sequence[Array]) -> Array:
     return np.cross(directions[0], directions[1])
 
 
-def relative_motion(candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, n_points: int) -> csr_array:
+def relative_motion(candidates: Candidates, pairing: Pairing, n_points: int) -> csr_array:
     """Return the map (n, n_points) from nodal vectors to the differences between candidates and their projections [-].
 
     Rows of unpaired candidates are empty.
     """
-    rows = np.flatnonzero(pairing.paired)
-    nodes, weights = candidates.nodes[rows], candidates.shape[rows]
-    if not isinstance(primary, RigidSide):
-        feet = pairing.projections(primary, rows)
+    nodes, weights = candidates.nodes[pairing.rows], candidates.shape[pairing.rows]
+    if pairing.primary is not None:
+        feet = pairing.extended_feet(pairing.rows)
         nodes, weights = np.hstack([nodes, feet.nodes]), np.hstack([weights, -feet.shape])
     start = np.concatenate([[0], np.cumsum(pairing.paired) * nodes.shape[1]])
     motion = csr_array((weights.ravel(), nodes.ravel(), start), shape=(len(candidates.nodes), n_points))
@@ -371,9 +385,3 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     if isinstance(primary, RigidSide) and result not in ("facet", "averaged"):
         raise ContactError(f"normals = {normals!r} are for contact between bodies: a rigid obstacle has its own")
     return result
-
-
-def with_secondary_normals(pairing: Pairing, normals: Array) -> Pairing:
-    """Return the pairing with the opposites of secondary `normals` (n, dim); candidates that face away become unpaired."""
-    valid = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
-    return replace(pairing, normal=np.where(valid[:, None], -normals, pairing.normal), paired=pairing.paired & valid)

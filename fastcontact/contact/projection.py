@@ -21,7 +21,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers, largest
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
-from fastcontact.contact.surface import FacetBlock, Surface, by_block, padded
+from fastcontact.contact.surface import Surface, by_block, padded
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
@@ -65,8 +65,9 @@ def facet_points(side: Surface, facet: Indices, xi: Array) -> FacetPoints:
     """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) in the facets numbered `facet` (n,)."""
     nodes = side.all_facets[facet]
     shape, gradient = np.zeros(nodes.shape), np.zeros((*nodes.shape, xi.shape[1]))
-    for block, (rows, _) in zip(side.blocks, by_block(facet, side.sizes), strict=True):
+    for block, first in zip(side.blocks, side.offsets):
         element, n = elements.get(block.element), block.facets.shape[1]
+        rows = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
         shape[rows, :n], gradient[rows, :n] = element.shape(xi[rows]), element.gradient(xi[rows])
     return FacetPoints(nodes, side.all_local[facet], shape, gradient)
 
@@ -124,17 +125,20 @@ class DeformedSide:
     @cached_property
     def facet_normals(self) -> Array:
         """Unit normals (n_facets, k, dim) of all facets at the nodes `Surface.all_facets`, zero at repeated nodes."""
-        return padded([facet_normals(block, self.coordinates) for block in self.surface.blocks])
+        normals = []
+        for block in self.surface.blocks:
+            nodes, slopes = self.coordinates[block.facets], block.slopes_at_nodes
+            if nodes.shape[2] == 3:
+                normals.append(_face_normals(nodes, slopes))
+            else:
+                normal = area_vectors(nodes, slopes)
+                length = np.linalg.norm(normal, axis=2, keepdims=True)  # zero if facets degenerate to points
+                normals.append(np.divide(normal, length, out=np.zeros_like(normal), where=length != 0.0))
+        return padded(normals)
 
     @cached_property
-    def _weights(self) -> Array:
-        """Weights (n_facets, k) of the normals of facets in averages at nodes.
-
-        They are the interior angles of the facets at corners [radian], 1 at other nodes and on lines, and 0 where
-        `Surface.all_facets` repeats a node.
-        """
-        if self.coordinates.shape[1] == 2:
-            return self.surface.node_weights
+    def _angles(self) -> Array:
+        """Interior angles (n_facets, k) of faces at corners [radian]; 1 at other nodes, and 0 at repeated nodes."""
         from fastcontact.contact import projection_kernels
 
         weights = []
@@ -152,8 +156,11 @@ class DeformedSide:
         weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
         """
         node, dim = self.surface.all_local.ravel(), self.coordinates.shape[1]
-        total = np.empty((len(self.surface.points), dim))
-        for axis, component in enumerate((self._weights[..., None] * self.facet_normals).reshape(-1, dim).T):
+        total, weights = (
+            np.empty((len(self.surface.points), dim)),
+            self.surface.node_weights if dim == 2 else self._angles,
+        )
+        for axis, component in enumerate((weights[..., None] * self.facet_normals).reshape(-1, dim).T):
             total[:, axis] = np.bincount(node, component, len(total))
         self.surface.add_across_ends(total)
         length = np.linalg.norm(total, axis=1, keepdims=True)
@@ -180,11 +187,8 @@ class DeformedSide:
         are those of `Surface.all_facets`.
         """
         shape, node = self.facet_normals.shape, self.surface.all_local.ravel()
-        smooth, normal, weight = (
-            self.nodal_normals[node],
-            self.facet_normals.reshape(-1, shape[2]),
-            self._weights.ravel(),
-        )
+        smooth, normal = self.nodal_normals[node], self.facet_normals.reshape(-1, shape[2])
+        weight = (self.surface.node_weights if shape[2] == 2 else self._angles).ravel()
         # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
         entries = np.flatnonzero(self.surface.node_weights)  # without repeated nodes
         deviates = np.einsum("pd,pd->p", normal[entries], smooth[entries]) < np.cos(np.radians(0.5 * self.corner))
@@ -201,18 +205,13 @@ class DeformedSide:
         return smooth.reshape(shape)
 
 
-def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
-    """Return the unit normals (n_facets, n_nodes, dim) of each facet at its nodes, for `coordinates` (n_points, dim)."""
-    nodes, slopes = coordinates[block.facets], block.slopes_at_nodes
-    if nodes.shape[2] == 3:
-        from fastcontact.contact import projection_kernels
+def _face_normals(nodes: Array, slopes: Array) -> Array:
+    """Return unit normals (n, k, 3) of faces with `nodes` (n, k, 3); `slopes` are `FacetBlock.slopes_at_nodes`."""
+    from fastcontact.contact import projection_kernels
 
-        out = np.empty(nodes.shape)
-        parallel_map(lambda span: projection_kernels.normals(nodes, slopes, *span, out), portions(*block.facets.shape))
-        return out
-    normal = area_vectors(nodes, slopes)
-    length = np.linalg.norm(normal, axis=2, keepdims=True)
-    return np.divide(normal, length, out=np.zeros_like(normal), where=length != 0.0)  # facets may degenerate to points
+    out = np.empty(nodes.shape)
+    parallel_map(lambda span: projection_kernels.normals(nodes, slopes, *span, out), portions(*nodes.shape[:2]))
+    return out
 
 
 def interpolate(normals: Array, points: FacetPoints) -> Array:

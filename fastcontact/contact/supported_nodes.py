@@ -17,7 +17,7 @@ from fastcontact.contact.held_motions import (
 )
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, relative_motion
-from fastcontact.contact.projection import SMALL_OVERHANG, FacetPoints, facet_points
+from fastcontact.contact.projection import SMALL_OVERHANG
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import rows_of
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -36,7 +36,7 @@ def nodes_with_prescribed_gap(sides: ContactSides, config: Configuration) -> Mas
     nodes = np.flatnonzero(np.isin(points, motions.restrained))
     if len(nodes):
         candidates, pairing = _paired_nodes(sides, nodes, config)
-        rows = rows_of(relative_motion(candidates, pairing, sides.primary, len(sides.points)), pairing.normal)
+        rows = rows_of(relative_motion(candidates, pairing, len(sides.points)), pairing.normal)
         # The gap is prescribed if the free unknowns carry less than half of the length of its row.
         square, free_square = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ motions.motion))
         prescribed[nodes] = pairing.paired & (free_square < 0.25 * square)
@@ -101,12 +101,12 @@ def _held_without_motion(sides: ContactSides, config: Configuration) -> Array:
     motions, points = sides.held_motions, sides.secondary.points[nodes]
     if not len(nodes) or motions is None:
         return held
-    pairing, held_opposite, feet = _held_projections(sides, nodes, motions, config)
+    pairing, held_opposite = _held_projections(sides, nodes, motions, config)
     common, slip = motions.projectors_at(points), (config.displacement - config.start)[points]
-    if isinstance(sides.primary, RigidSide) or feet is None:
+    if isinstance(sides.primary, RigidSide):
         slip = slip - sides.rigid_motion(lambda coordinates: coordinates[points], config)
     else:
-        rows, held_primary = np.flatnonzero(pairing.paired), motions.projectors_at(feet.nodes)
+        rows, feet, held_primary = pairing.rows, pairing.feet, motions.projectors_at(pairing.feet.nodes)
         motion = (config.displacement - config.start)[feet.nodes]
         mean = np.einsum("nk,nkd->nd", feet.shape, motion)
         # The point opposite to a held node may lie slightly off the held primary node, if the normal is inclined. The
@@ -134,16 +134,14 @@ def _paired_nodes(sides: ContactSides, nodes: Indices, config: Configuration) ->
 
 def _held_projections(
     sides: ContactSides, nodes: Indices, motions: HeldMotions, config: Configuration
-) -> tuple[Pairing, Array, FacetPoints | None]:
-    """Return the pairing of secondary `nodes` (n,), the directions in which their projections are held, and these points.
+) -> tuple[Pairing, Array]:
+    """Return the pairing of secondary `nodes` (n,), and the directions in which their projections are held.
 
-    The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets. The points
-    are those of the paired nodes; None for a rigid obstacle.
+    The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
     """
-    pairing, feet = _paired_nodes(sides, nodes, config)[1], None
+    pairing = _paired_nodes(sides, nodes, config)[1]
     held_primary = np.zeros((len(nodes), *2 * sides.points.shape[1:]))
-    if isinstance(sides.primary, Surface):
-        rows = np.flatnonzero(pairing.paired)
-        feet = facet_points(sides.primary, pairing.facet[rows], pairing.xi[rows])
-        held_primary[rows] = np.einsum("nk,nkde->nde", feet.shape, motions.projectors_at(feet.nodes))
-    return pairing, held_primary, feet
+    if pairing.primary is not None:
+        projectors = motions.projectors_at(pairing.feet.nodes)
+        held_primary[pairing.rows] = np.einsum("nk,nkde->nde", pairing.feet.shape, projectors)
+    return pairing, held_primary

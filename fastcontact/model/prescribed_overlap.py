@@ -156,7 +156,7 @@ def _gaps(
 ) -> tuple[Array, csr_array, Mask]:
     """Return the gaps (m,) of nodes [length], their rows (m, n_dofs), and the mask (m,) of paired nodes."""
     pairing = formulation.pair_candidates(candidates, configuration)
-    motion = relative_motion(candidates, pairing, formulation.primary, len(formulation.points))
+    motion = relative_motion(candidates, pairing, len(formulation.points))
     rows, gap = gap_rows(motion, pairing, formulation.points)
     gap = gap + rows @ configuration.displacement.ravel()
     if with_clearance:
@@ -167,7 +167,7 @@ def _gaps(
 def _jumps(formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask) -> tuple[Array, Mask]:
     """Return the displacement jumps (m,) at tied nodes due to supports [length], and the mask (m,) of paired nodes."""
     pairing = formulation.pair_candidates(candidates, Configuration.undeformed(formulation.points))
-    motion = relative_motion(candidates, pairing, formulation.primary, len(formulation.points))
+    motion = relative_motion(candidates, pairing, len(formulation.points))
     square = np.zeros(len(pairing.paired))
     for axis in np.eye(fixed.shape[1]):
         rows = rows_of(motion, np.broadcast_to(axis, pairing.normal.shape))

@@ -14,7 +14,7 @@ from fastcontact.analysis.modal.held_contact import contact_stiffness
 from fastcontact.cli import main
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.contact.linearised_geometry import paired_points
+from fastcontact.contact.linearised_projections import paired_points
 from fastcontact.contact.pairing import Candidates
 from fastcontact.mesh import elements
 

@@ -20,7 +20,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.integration import areas_of_rule, fine_rule
-from fastcontact.contact.linearised_geometry import paired_points
+from fastcontact.contact.linearised_projections import paired_points
 from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.tied import TiedPair, moments_of, split_rows
 from fastcontact.errors import ModelError

@@ -41,10 +41,10 @@ def line_points(
     The primary side is extended by `tolerance` facet lengths at its ends. `borders` are additional cuts, given by their
     facets (n,) and reference coordinates (n,).
     """
-    cuts = _opposite_nodes(block, primary), borders, _opposite_ends(block, primary, tolerance)
-    ends = np.repeat([-1.0, 1.0], len(block.facets))
-    facet = np.concatenate([np.tile(np.arange(len(block.facets)), 2), *(facets for facets, _ in cuts)])
-    xi = np.concatenate([ends, *(coordinates for _, coordinates in cuts)])
+    n = len(block.facets)
+    ends = np.tile(np.arange(n), 2), np.repeat([-1.0, 1.0], n)
+    cuts = ends, _opposite_nodes(block, primary), borders, _opposite_ends(block, primary, tolerance)
+    facet, xi = map(np.concatenate, zip(*cuts, strict=True))
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
     is_segment = (facet[1:] == facet[:-1]) & (np.diff(xi) > LENGTH_ROUND_OFF)

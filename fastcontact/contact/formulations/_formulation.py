@@ -12,19 +12,14 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._tools.neighbours import nearest
-from fastcontact.arrays import AnyArray, Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Linearised, MultiplierCompliance
 from fastcontact.contact.contact_sides import ContactSides
 from fastcontact.contact.held_motions import eigenspaces, without_complete_facets
-from fastcontact.contact.linearised_geometry import (
-    ClosingMotion,
-    InterpolatedNormals,
-    LinearisedPoints,
-    Slips,
-    paired_points,
-)
+from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, Slips
+from fastcontact.contact.linearised_projections import InterpolatedNormals, paired_points
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
@@ -141,7 +136,8 @@ class Formulation(ContactSides, ABC):
         if has_penalty and self.options.cohesion is None:
             constraints = self._with_penalties(constraints, config)
         if config.elastic_slip is not None and constraints.tangents:
-            previous_slip = _values_at(config.elastic_slip, constraints.positions)
+            positions, values = config.elastic_slip
+            previous_slip = values[nearest(positions, constraints.positions)[1]]
             elastic_slip = -np.einsum("kmd,md->km", np.stack(constraints.directions), previous_slip)
             constraints = replace(constraints, elastic_slip=elastic_slip)
         if self.options.kind == "gap_only":
@@ -152,7 +148,8 @@ class Formulation(ContactSides, ABC):
             distance = np.minimum(np.abs(constraints.gaps(config.displacement)), np.abs(constraints.gaps(config.start)))
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
-            initial_gap = _values_at(self._initial_gaps, constraints.positions)
+            positions, gaps = self._initial_gaps
+            initial_gap = gaps[nearest(positions, constraints.positions)[1]]
             body_stiffness = self.modulus / self.shortest_edge
             return cohesive_rows(self.options.cohesion, constraints, config, initial_gap, body_stiffness)
         equality = self.never_opening(constraints.positions, config)
@@ -230,7 +227,8 @@ class Formulation(ContactSides, ABC):
         always_closed = self.options.kind in ALWAYS_CLOSED
         if always_closed or config.never_opening is None:
             return np.full(len(positions), always_closed)
-        return np.asarray(_values_at(config.never_opening, positions))
+        known_positions, values = config.never_opening
+        return np.asarray(values[nearest(known_positions, positions)[1]])
 
     def assembled(
         self, candidates: Candidates, pairing: Pairing, compliance: MultiplierCompliance | None, config: Configuration
@@ -239,25 +237,27 @@ class Formulation(ContactSides, ABC):
 
         The `compliance`, if any, is `Constraints.compliance`.
         """
-        motion = relative_motion(candidates, pairing, self.primary, len(self.points))
+        motion = relative_motion(candidates, pairing, len(self.points))
         B, gap0 = gap_rows(motion, pairing, self.points)
-        gap0 += self.added_gap(candidates, pairing, config) - self.smoothing_overlap(candidates, pairing, config)
-        constraints = Constraints(B, gap0, candidates.positions(self.points), compliance)
-        directions: tuple[Array, ...] = ()
+        added_gap = self.added_gap(candidates, pairing, config)
+        if self.smoothing is not None:
+            added_gap -= self.smoothing_overlap(candidates, pairing, self.smoothing, config)
+        gap0 += added_gap
+        directions, options = tuple[Array, ...](), dict[str, Any]()
         if self.has_tangents:
             projectors = None
-            if self.friction and self.held_motions is not None and len(self.held_motions.nodes):
+            if self.friction and self.held_motions is not None and len(self.held_nodes):
                 # Projectors onto the directions in which all nodes of a candidate are held.
                 held = np.einsum("nk,nkde->nde", candidates.shape, self.held_motions.projectors_at(candidates.nodes))
                 projectors = eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
             axes = tangents(pairing.normal, projectors)
             friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
             slip0 = self.slip_at_rest(candidates, pairing, slip_axes, config)
-            rows = tuple([rows_of(motion, axis) for axis in slip_axes])
-            constraints = replace(constraints, tangents=rows, directions=directions, friction=friction, slip0=slip0)
-        if self.normals == "secondary":  # derivatives are not implemented
-            return constraints
-        return replace(constraints, geometry=partial(self._linearised_points, candidates, pairing, config, directions))
+            rows = tuple(map(partial(rows_of, motion), slip_axes))
+            options = {"tangents": rows, "directions": directions, "friction": friction, "slip0": slip0}
+        if self.normals != "secondary":  # whose derivatives are not implemented
+            options["geometry"] = partial(self._linearised_points, candidates, pairing, config, directions)
+        return Constraints(B, gap0, candidates.positions(self.points), compliance, **options)
 
     def _linearised_points(
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array],
@@ -271,7 +271,9 @@ class Formulation(ContactSides, ABC):
         if self.linearised_at_mean:
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.pair_candidates(candidates, config, np.inf)
-        slope = self.smoothing_slope(candidates, pairing, rows, self.points + config.displacement)
+        slope = (
+            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
+        )
         options = self.primary, self.points, config, self.normals
         points = paired_points(candidates, pairing, rows, *options, slope=slope)
         if self.linearised_at_mean:
@@ -286,7 +288,7 @@ class Formulation(ContactSides, ABC):
             return replace(linearised, slips=slips)
         averaged, slip_normals = points.averaged, None
         if averaged is None:
-            feet, primary = pairing.projections(self.primary, rows), config.deformed(self.primary, self.points)
+            feet, primary = pairing.extended_feet(rows), config.deformed(self.primary, self.points)
             averaged = InterpolatedNormals(primary, feet.local, feet.shape, primary.smooth_normals[pairing.facet[rows]])
             slip_normals = averaged, averaged.gradient(feet.gradient)
         local = self.number_on_side[candidates.nodes[rows]]
@@ -311,12 +313,3 @@ class Formulation(ContactSides, ABC):
                 rotation_gradient = unit_motions[1:] - unit_motions[0]
         slip_data = directions, tangential, total, increment, self.points + config.start
         return Slips(*slip_data, rotation_gradient=rotation_gradient)
-
-
-def _values_at(points_and_values: tuple[Array, AnyArray], positions: Array) -> AnyArray:
-    """Return the values (m, ...) at the known points nearest to `positions` (m, dim).
-
-    `points_and_values` are the k known points (k, dim) [length], and their values (k, ...).
-    """
-    points, values = points_and_values
-    return np.asarray(values[nearest(points, positions)[1]])

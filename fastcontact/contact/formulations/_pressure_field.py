@@ -27,7 +27,7 @@ at least as many points with an area as nodes. Integrals are taken over the unde
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -130,7 +130,7 @@ class PressureField(NodalField):
         at_points, at_nodes = self.axes
         return np.einsum("nde,ne->nd", at_nodes, super().traction(np.einsum("mde,md->me", at_points, force)))
 
-    @property
+    @cached_property
     def covered(self) -> Array:
         """Covered fractions (n_nodes,) of the nodal areas; one for nodes without area [-]."""
         areas = self.nodal_areas
@@ -282,7 +282,9 @@ class PressureFieldFormulation(Formulation):
         if constraints.tangents and constraints.geometry is not None:
             geometry = partial(_with_compliance, constraints.geometry, projection, field.axes)
             constraints = replace(constraints, geometry=geometry)
-        Z = self._compliance_at_supports(field, constraints, directions, config) if self.friction else np.empty(0)
+        Z = np.empty(0)
+        if self.friction and len(self.held_nodes):
+            Z = self._compliance_at_supports(field, constraints, directions, config)
         areas = np.where(projection.areas > 0, projection.areas, np.inf)
         return replace(constraints, low_rank_compliance=Z, areas=areas, nodal=field, coupled_directions=directions)
 
@@ -325,13 +327,4 @@ def _with_compliance(
     """
     linearised = geometry(multiplier, tangential, displacement)
     assert isinstance(linearised, LinearisedPoints)
-    assert linearised.rows_in_pair is not None
-    rows, count = linearised.rows_in_pair
-
-    def elastic_displacements(force: Array) -> Array:
-        forces = np.zeros((count, force.shape[1]))
-        forces[rows] = force if axes is None else np.einsum("mde,md->me", axes[0][rows], force)
-        displacements = projection.apply(forces)[rows]
-        return displacements if axes is None else np.einsum("mde,me->md", axes[0][rows], displacements)
-
-    return replace(linearised, compliance=elastic_displacements)
+    return replace(linearised, compliance=(projection, axes))

@@ -35,7 +35,8 @@ from fastcontact.contact.formulations._finite_differences import FiniteDifferenc
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NEGLIGIBLE_AREA, areas_of_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, Points, Substitution, paired_points
+from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, Substitution
+from fastcontact.contact.linearised_projections import Points, paired_points
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import FACING, Candidates, Normals, pair, tangents
 from fastcontact.contact.projection import DeformedSide
@@ -288,7 +289,9 @@ class WeightedMortar(Formulation):
             closing = ClosingMotion(means.normal, secondary, opening, slip_data.length)
             slips = replace(slips, total=slips.total + symmetric * closing.vector, closing=closing, symmetric=symmetric)
             for (substitution, _), weights in zip(slip_data.substitutions, functions, strict=True):
-                slips = slips.with_substitution(replace(substitution, functions=weights), linearised.points.motion)
+                substitution = replace(substitution, functions=weights)
+                total = slips.total + substitution.slip(closing.vector, linearised.points.motion @ slips.motion)
+                slips = replace(slips, total=total, substitutions=(*slips.substitutions, substitution))
         return replace(linearised, slips=slips)
 
     def _needs_differences(self, config: Configuration, multiplier: Array) -> bool:
@@ -335,7 +338,9 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), primary, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        slope = self.smoothing_slope(candidates, pairing, rows, deformed)
+        slope = (
+            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
+        )
         options = self.primary, self.points, config
         points = paired_points(candidates, pairing, rows, *options, normals, True, slope)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]

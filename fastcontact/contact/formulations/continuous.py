@@ -190,7 +190,7 @@ class Continuous(PressureFieldFormulation):
         pairing = self.pair_candidates(self._candidates, config)
         areas = self._field.projection.areas
         at_axis = self._at_axis
-        pairing.paired[~(areas > ROUND_OFF * areas.max()) & ~at_axis] = False
+        pairing = replace(pairing, paired=pairing.paired & ((areas > ROUND_OFF * areas.max()) | at_axis))
         constraints = self.constraints_of_points(self._candidates, pairing, self._field, config)
         if at_axis.any():  # There is no slip on the axis.
             constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
@@ -212,7 +212,7 @@ class Continuous(PressureFieldFormulation):
         values, forces, rows = pressure[used.independent], [], csr_array((0, 0))
         for candidates, projection in ((self._candidates, used.projection), (points, fine.projection)):
             pairing = self.pair_candidates(candidates, config)
-            rows = rows_of(relative_motion(candidates, pairing, primary, len(self.points)), pairing.normal)
+            rows = rows_of(relative_motion(candidates, pairing, len(self.points)), pairing.normal)
             forces.append((rows.T @ (projection.areas * (projection.P @ values))).reshape(self.points.shape))
         mass, error = mass_matrix(primary, self.points, self.axisymmetric).tocsc(), np.zeros_like(self.points)
         error[primary.points] = splu(mass).solve((forces[0] - forces[1])[primary.points])

@@ -86,6 +86,8 @@ class CompleteFacets:
         degrees[~mass.any(axis=(1, 2))] = -1
         size = np.einsum("fkk->f", self.mass)
         partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > SINGLE_PRECISION * size))
+        if not len(partly):
+            return degrees
         full, partial, T = self.mass[partly], mass[partly], self.to_corners
         linear = _smallest_eigenvalues(T @ full @ T.T, T @ partial @ T.T) > SMALLEST_EIGENVALUE
         complete = _smallest_eigenvalues(full, partial) > SMALLEST_EIGENVALUE

@@ -84,7 +84,7 @@ class NodeToSegment(Formulation):
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
         pairing = self.pair_candidates(self.node_candidates, config)
-        pairing.paired[self.excluded[self.secondary.points]] = False
+        pairing = replace(pairing, paired=pairing.paired & ~self.excluded[self.secondary.points])
         nodal_areas = self._nodal_forces.nodal_areas
         areas = np.where(nodal_areas > ROUND_OFF * nodal_areas.max(), nodal_areas, np.inf)
         constraints = self.assembled(self.node_candidates, pairing, None, config)

@@ -6,14 +6,12 @@ end of a line in 2D, and an edge of a face in 3D. Adjacent facets share a ridge.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import DeformedSide, facet_normals
+from fastcontact.arrays import Indices, Mask
+from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -21,31 +19,14 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets, same_facets
 
 
-class SurfaceFacets(NamedTuple):
-    """The facets of a rigid surface and their normals.
-
-    The smooth normal of a facet at a node is the mean of the normals of those facets at the node that meet the facet at the
-    crease angle or less, weighted by their interior angles at the node (Thuermer and Wuethrich, 1998). k is the largest
-    number of nodes of a facet, see `Surface.all_facets`.
-    """
-
-    side: Surface
-    normals: Array  # (n_facets, k, dim): unit normals at the nodes [-]
-    smooth_normals: Array  # (n_facets, k, dim): the same, of the smooth surface [-]
-    nodal_normals: Array  # (m, dim): unit normals of the nodes of the side, the means over all facets [-]
-    on_border: Mask  # (m,): whether the surface ends at the node
-
-
-def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> SurfaceFacets:
-    """Return the facets of a group, and their normals.
+def rigid_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> tuple[DeformedSide, Mask]:
+    """Return the facets of a group, with their normals, and the nodes (m,) at which the surface ends.
 
     Facets that meet at the angle `crease` [degrees] or less form a smooth surface. Raises ContactError if the facets do not
     form an orientable surface.
     """
     side, numbers = _oriented(mesh, group, flip)
-    deformed = DeformedSide(side, mesh.points, crease)
-    normals = deformed.facet_normals, deformed.smooth_normals, deformed.nodal_normals
-    return SurfaceFacets(side, *normals, _border(mesh, side, numbers))
+    return DeformedSide(side, mesh.points, crease), _border(mesh, side, numbers)
 
 
 def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:
@@ -72,7 +53,8 @@ def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:
         if flip:
             facets = facets[:, list(elements.get(name).reversed)]
         blocks.append(FacetBlock(name, np.ascontiguousarray(facets), np.searchsorted(points, facets)))
-        lengths = np.linalg.norm(facet_normals(blocks[-1], mesh.points), axis=2)
+        side = Surface(group, (blocks[-1],), points, np.zeros(len(points)))
+        lengths = np.linalg.norm(DeformedSide(side, mesh.points).facet_normals, axis=2)
         degenerate = np.flatnonzero(~(lengths.min(axis=1) > 0.0))
         if len(degenerate):
             raise ContactError(

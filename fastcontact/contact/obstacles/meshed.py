@@ -8,10 +8,11 @@ import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask
-from fastcontact.contact.obstacles._facets import SurfaceFacets, surface_facets
+from fastcontact.contact.obstacles._facets import rigid_facets
 from fastcontact.contact.projection import (
     SMALL_OVERHANG,
     Closest,
+    DeformedSide,
     closest_of_types,
     distance_from_edges,
     facet_points,
@@ -65,15 +66,15 @@ class MeshedSurface:
     group: str
     flip: bool = False
     crease: float = 30.0
-    _facets: SurfaceFacets = field(init=False, repr=False)
+    _facets: tuple[DeformedSide, Mask] = field(init=False, repr=False)  # and whether the surface ends at each node
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.crease <= 180.0:
             raise ContactError(f"crease = {self.crease} of the rigid surface '{self.group}' must be 0 to 180 degrees")
-        object.__setattr__(self, "_facets", surface_facets(self.mesh, self.group, self.flip, self.crease))
+        object.__setattr__(self, "_facets", rigid_facets(self.mesh, self.group, self.flip, self.crease))
 
     def __repr__(self) -> str:
-        return f"MeshedSurface('{self.group}', {self._facets.side.n_facets} facets)"
+        return f"MeshedSurface('{self.group}', {self._facets[0].surface.n_facets} facets)"
 
     def check_apart(self, mesh: Mesh) -> None:
         """Raise ContactError if the surface is part of `mesh` and belongs to solid cells there."""
@@ -97,11 +98,11 @@ class MeshedSurface:
             raise ContactError(
                 f"the rigid surface '{self.group}' has {dim} dimensions, but the model {points.shape[1]}"
             )
-        nodes_by_type = self._facets.side.node_positions(self.mesh.points)
-        closest = closest_of_types(points, nodes_by_type)
+        side = self._facets[0].surface
+        closest = closest_of_types(points, side.node_positions(self.mesh.points))
         pseudonormal, averaged, on_edge, on_border = self._closest_normals(closest)
         offset = points - closest.position
-        size = np.concatenate([block.diameters(self.mesh.points) for block in self._facets.side.blocks])[closest.facet]
+        size = np.concatenate([block.diameters(self.mesh.points) for block in side.blocks])[closest.facet]
         # At touching points, the direction from the closest point is dominated by round-off, and the facet normal is used.
         is_touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
@@ -127,18 +128,19 @@ class MeshedSurface:
         of the adjacent facets on an edge, and the angle-weighted mean normal of all facets at a corner (Baerentzen and
         Aanaes, 2005).
         """
-        (side, normals, smooth_normals, nodal_normals, border), (facet, xi) = self._facets, closest[:2]
+        (facets, border), (facet, xi) = self._facets, closest[:2]
+        side = facets.surface
         feet, on_edge = facet_points(side, facet, xi), distance_from_edges(side, facet, xi) <= ROUND_OFF
         node = feet.local[np.arange(len(facet)), feet.shape.argmax(axis=1)]
         at_node = on_edge & (feet.shape.max(axis=1) >= 1.0 - ROUND_OFF)
-        pseudonormal = np.where(at_node[:, None], nodal_normals[node], closest.normal)
+        pseudonormal = np.where(at_node[:, None], facets.nodal_normals[node], closest.normal)
         on_border = at_node & border[node]
         rows = np.flatnonzero(on_edge & ~at_node)
         if len(rows):
             point, adjacent, adjacent_xi = facets_containing(side, facet[rows], xi[rows])
             is_other = adjacent != facet[rows][point]
             adjacent_feet = facet_points(side, adjacent[is_other], adjacent_xi[is_other])
-            other_normals = interpolate(normals[adjacent[is_other]], adjacent_feet)
+            other_normals = interpolate(facets.facet_normals[adjacent[is_other]], adjacent_feet)
             np.add.at(pseudonormal, rows[point[is_other]], other_normals)
             on_border[rows] = np.bincount(point) == 1
-        return pseudonormal, interpolate(smooth_normals[facet], feet), on_edge, on_border
+        return pseudonormal, interpolate(facets.smooth_normals[facet], feet), on_edge, on_border

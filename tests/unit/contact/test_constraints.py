@@ -119,9 +119,9 @@ def test_rows_are_sums_over_both_sides(sides):
     n = len(secondary.points)
     nodes = Candidates(secondary.points[:, None], np.ones((n, 1)))
     facet, xi = rng.integers(0, primary.n_facets, n), rng.uniform(-1, 1, (n, 1))
-    pairing = Pairing(facet, xi, rng.normal(size=(n, 2)), rng.random(n) < 0.7)
+    pairing = Pairing(facet, xi, rng.normal(size=(n, 2)), rng.random(n) < 0.7, primary=primary)
     direction, u = rng.normal(size=(n, 2)), rng.normal(size=mesh.points.shape)
-    motion = relative_motion(nodes, pairing, primary, len(u))
+    motion = relative_motion(nodes, pairing, len(u))
     found = rows_of(motion, direction)
     shape = elements.get(primary.only_block.element).shape(xi)
     theirs = np.einsum("nk,nkd->nd", shape, u[primary.only_block.facets[facet]])
@@ -137,8 +137,8 @@ def test_a_node_that_is_named_twice_counts_twice():
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), radial_sizes=(3.0, 9.0), segments=3)
     side = surface(mesh, "CONT1")
     nodes = Candidates(np.repeat(side.points[:1, None], 2, axis=1), np.array([[0.25, 0.5]]))
-    pairing = Pairing(np.array([5]), np.zeros((1, 1)), np.ones((1, 2)), np.ones(1, bool))
-    found = rows_of(relative_motion(nodes, pairing, side, mesh.n_points), np.array([[1.0, 0.0]]))
+    pairing = Pairing(np.array([5]), np.zeros((1, 1)), np.ones((1, 2)), np.ones(1, bool), primary=side)
+    found = rows_of(relative_motion(nodes, pairing, mesh.n_points), np.array([[1.0, 0.0]]))
     assert found[0, 2 * side.points[0]] == 0.75
 
 

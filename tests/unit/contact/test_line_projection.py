@@ -13,7 +13,6 @@ from fastcontact.contact.projection import (
     along_line_normals,
     along_normals,
     closest_of_types,
-    facet_normals,
     facet_points,
     interpolate,
 )
@@ -148,7 +147,7 @@ def test_normals_are_those_of_the_tangents(element):
     tangent = np.einsum("akj,fkd->fadj", facet.gradient(facet.nodes), points[block.facets])
     normal = np.cross(tangent[..., 0], tangent[..., 1])
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    assert facet_normals(block, points) == pytest.approx(normal, abs=1e-13)
+    assert DeformedSide(side, points).facet_normals == pytest.approx(normal, abs=1e-13)
 
 
 @pytest.mark.parametrize("element", KINDS)
@@ -156,7 +155,7 @@ def test_means_are_weighted_by_the_angles_at_corners(element):
     points, side = rough(element)
     (block,) = side.blocks
     facet = elements.get(block.element)
-    total, own = np.zeros((len(side.points), 3)), facet_normals(block, points)
+    total, own = np.zeros((len(side.points), 3)), DeformedSide(side, points).facet_normals
     for row, nodes in enumerate(block.facets):
         for a in range(facet.n_nodes):
             weight = 1.0
@@ -237,7 +236,7 @@ def test_corners_are_taken_one_by_one():
         [mesh.cell_groups[name] for name in ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX")]
     )}), "ALL")  # fmt: skip
     normals = DeformedSide(side, mesh.points).smooth_normals
-    assert normals == pytest.approx(facet_normals(side.blocks[0], mesh.points), abs=1e-15)
+    assert normals == pytest.approx(DeformedSide(side, mesh.points).facet_normals, abs=1e-15)
 
 
 @pytest.mark.skipif(not decorators.jit_enabled(), reason="one thread interprets")
@@ -248,8 +247,8 @@ def test_threads_change_no_bit(monkeypatch):
     monkeypatch.setattr(projection, "portions", lambda count, nodes=1: [(0, 3), (3, count // 2), (count // 2, count)])
     for one, other in zip(alone, along_normals(candidates, DeformedSide(side, points), normals, start), strict=True):
         assert (one == other).all()
-    for block in side.blocks:
-        assert np.array_equal(facet_normals(block, points), facet_normals(block, points))
+    facet_normals, repeated = (DeformedSide(side, points).facet_normals for _ in range(2))
+    assert np.array_equal(facet_normals, repeated)
 
 
 def test_reference_coordinates_in_and_beyond_a_facet():

@@ -63,7 +63,7 @@ def test_a_surface_may_mix_triangles_and_quadrangles(order):
         found = pair(positions, DeformedSide(side, mesh.points), 0.5, normals)
         candidates = Candidates(np.zeros((50, 1), np.int32), np.zeros((50, 1)))
         # Without the candidates' own nodes the rows give minus the height of the surface under them.
-        B, gap = gap_rows(relative_motion(candidates, found, side, mesh.n_points), found, mesh.points)
+        B, gap = gap_rows(relative_motion(candidates, found, mesh.n_points), found, mesh.points)
         assert gap == pytest.approx(-1.0, abs=1e-14)
         assert B.sum(axis=1) == pytest.approx(-1.0, abs=1e-14)
         assert found.normal == pytest.approx(np.tile([0.0, 0, 1], (50, 1)), abs=1e-14)
@@ -117,7 +117,7 @@ def test_gap_rows_do_not_see_rigid_motions():
     lifted[nodes.ravel()] = np.random.default_rng(2).uniform([0.2, 0.2, 1.2], [0.8, 0.8, 1.4], (6, 3))
     found = pair(candidates.positions(lifted), DeformedSide(side, lifted), 0.5, "averaged")
     assert found.paired.all()
-    B, gap = gap_rows(relative_motion(candidates, found, side, mesh.n_points), found, lifted)
+    B, gap = gap_rows(relative_motion(candidates, found, mesh.n_points), found, lifted)
     assert (gap > 0).all()
     shift = np.tile([0.3, -0.2, 0.7], len(mesh.points))
     assert np.abs(B @ shift).max() < 1e-14
