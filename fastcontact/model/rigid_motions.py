@@ -344,13 +344,10 @@ def _edges(constraints: Constraints, factor: float, added: Sequence[Array] | Non
         weights = [np.array([1.0]), np.array([-1.0])]
     else:
         angle = 2.0 * np.pi * np.arange(EDGES) / EDGES
-        radius = 1.0 if added is not None else 1.0 / np.cos(np.pi / EDGES)
-        weights = [*(np.column_stack([np.cos(angle), np.sin(angle)]) * radius), *(added or ())]
+        ratio = np.cos(np.pi / EDGES) if added is None else 1.0
+        weights = [*(np.column_stack([np.cos(angle), np.sin(angle)]) / ratio), *(added or ())]
     shear = [T.multiply(factor * constraints.friction[:, None]) for T in constraints.tangents]
-    edges = [
-        constraints.B + sum(T.multiply(np.reshape(weight, (-1, 1))) for T, weight in zip(shear, edge))
-        for edge in weights
-    ]
+    edges = [constraints.B + sum(T.multiply(np.reshape(w, (-1, 1))) for T, w in zip(shear, edge)) for edge in weights]
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 
@@ -444,7 +441,7 @@ def needed_friction(
     low, high, edges = NEARLY_SLIDING, LARGEST_FRICTION_FACTOR, list[Array]()
 
     def slide(factor: float) -> Array:
-        while True:
+        for _ in range(EDGES):
             rows, gap0 = cone_rows(constraints, factor, edges)
             stop = _relative_amplitudes(rows @ motions.displacement, gap0 + rows @ u, work, size)
             # Unbounded motions are of the order of FAR, and those that a gap stops of the order of 1.
@@ -455,8 +452,9 @@ def needed_friction(
             resistance = factor * constraints.friction * length
             resists = resistance - constraints.B @ motion > FACTOR_ACCURACY * resistance.max(initial=0.0)
             if len(slip) == 1 or not resists.any():
-                return stop
+                break
             edges.append(-slip / np.maximum(length, TINY))
+        return stop
 
     sliding = slide(low)
     if not sliding.any() or slide(high).any():
