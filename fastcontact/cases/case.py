@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -251,7 +252,9 @@ def _read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     try:
         return text, toml_text.parse(text)
     except ValueError as error:
-        raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
+        twice = re.search(r"Cannot declare \('(\w+)',\) twice", str(error))
+        hint = f". If there are several, write [[{twice[1]}]] above each" if twice and twice[1] in LISTS else ""
+        raise CaseError(f"the case file '{path}' is not valid TOML: {error}{hint}") from error
 
 
 def _reading_error(path: Path, error: Exception) -> str:

@@ -74,12 +74,18 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterab
         raise CaseError(f"'{where}' must be a table of keys, not {reprlib.repr(data)}")
     for key, value in data.items():
         label = f"{where}.{key}" if where else key
+        if key == "thickness" and key not in known:
+            raise CaseError(
+                f"unknown key '{label}': forces of plane models are per unit thickness; divide by the thickness"
+            )
         if key not in known:
             raise CaseError(unknown("key", label, [f"{where}.{k}" if where else k for k in known]))
         kinds = known[key] if isinstance(known[key], tuple | None) else (known[key],)
         if kinds is not None and (not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds)):
             if kinds == (list,) and isinstance(value, dict):
                 raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
+            if dict in kinds and isinstance(value, list) and label != "units":
+                raise CaseError(f"write [{label}], or [{label}.NAME] if there are several, in place of [[{label}]]")
             names = " or ".join(kind.__name__ for kind in kinds)
             raise CaseError(f"the value of '{label}' must be of type {names}, not {reprlib.repr(value)}")
     for key in required:

@@ -155,13 +155,13 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     gap : ndarray (n_nodes,)
         Gaps; the middle of an open contact is where the gap is smallest [length].
     """
-    surface, points, normal = pair.secondary, pair.points[pair.secondary.points], normal.copy()
-    crossed = list[tuple[int, int, Array]]()
+    surface, nodes, crossed = pair.secondary, pair.points[pair.secondary.points], list[tuple[Array, Array, Array]]()
+    points, normal = nodes.copy(), normal.copy()
     for first, second, rotation in surface.periodic_ends:
         moved = _parts_at_second_end(surface, closed | (force != 0.0), first, second)
         if first is not second and moved.any():  # not a plane of symmetry
-            crossed.append((int(first[0]), int(second[0]), rotation))
-            points[moved] = points[first[0]] + (points[moved] - points[second[0]]) @ rotation
+            crossed.append((nodes[first[0]], nodes[second[0]], rotation))
+            points[moved] = nodes[first[0]] + (points[moved] - nodes[second[0]]) @ rotation
             normal[moved] = normal[moved] @ rotation
     # Weights of the nodes for the centre of pressure; magnitudes if tension nearly cancels or exceeds compression.
     weight = force if float(force.sum()) > 1e-6 * float(np.abs(force).sum()) else np.abs(force)
@@ -181,9 +181,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
         planes = [(axis, nodes) for axis, nodes in planes if near_closed[nodes].any()]
     if dim == 2:
         return _middle_in_2d(surface, pair.points, points, weight, planes, mean, crossed)
-    middle, nodes = _middle_in_3d(points, weight, planes, mean), pair.points[surface.points]
-    periods = tuple((nodes[first], nodes[second], rotation) for first, second, rotation in crossed)
-    return replace(middle, periods=periods) if periods else middle
+    return replace(_middle_in_3d(points, weight, planes, mean), periods=tuple(crossed))
 
 
 def _parts_at_second_end(surface: Surface, closed: Mask, first: Indices, second: Indices) -> Mask:
@@ -231,12 +229,12 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
 
 def _middle_in_2d(
     surface: Surface, coordinates: Array, points: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array,
-    crossed: list[tuple[int, int, Array]],
+    crossed: list[tuple[Array, Array, Array]],
 ) -> ContactMiddle:  # fmt: skip
     """Return the middle on a surface in a plane model.
 
     A surface in several pieces is projected along its mean normal. The positions `points` (n_nodes, 2) of the nodes differ
-    from their `coordinates` [length] if the contact has `crossed` periodic ends, see `contact_middle`.
+    from their `coordinates` [length] if the contact has `crossed` periodic ends, see `ContactMiddle.periods`.
     """
     length = float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
@@ -244,15 +242,10 @@ def _middle_in_2d(
     if line is None:
         size = float(np.ptp(coordinates[surface.points], axis=0).max())
         line = UnrolledLine(centre + np.outer([-size, size], tangent), np.array([0.0, 2.0 * size]))
-    lengths, direction, backward = (
-        line.lengths(coordinates[surface.points]),
-        tangent if length > FACING else None,
-        False,
-    )
-    start = float(weight @ lengths)
+    lengths = line.lengths(coordinates[surface.points])
+    start, backward, direction = float(weight @ lengths), False, tangent if length > FACING else None
     if crossed:
-        first, second, _ = crossed[0]
-        jump = float(lengths[first] - lengths[second])
+        jump = float(-np.diff(line.lengths(np.array(crossed[0][:2])))[0])
         start = float(weight @ (lengths + jump * (points != coordinates[surface.points]).any(axis=1)))
         start -= 0.0 if 0.0 <= start <= line.abscissa[-1] else jump
         line, direction = replace(line, period=abs(jump)), None

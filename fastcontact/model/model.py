@@ -228,7 +228,8 @@ class Model(ModelSupports, metaclass=_PublicNames):
         work = [generalised_forces(motions, force.ravel()) for force in forces]
         # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
         gaps = gap_changes(self, motions, rigid_motions.LARGEST_FRICTION_FACTOR)
-        check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(work, (-1, len(motions))))))
+        unstopped = mechanisms(gaps, np.reshape(work, (-1, len(motions))), motions.simple)
+        check_motions(self.mesh, motions.combined(unstopped))
 
 
 def gap_changes(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:

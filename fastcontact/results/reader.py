@@ -248,6 +248,11 @@ class Results(StepSequence):
     def __exit__(self, *error: object) -> None:
         self.close()
 
+    def __del__(self) -> None:
+        """Close the file if the caller has not closed it."""
+        with contextlib.suppress(Exception):  # the constructor may have failed, or the interpreter may be exiting
+            self.close()
+
     def __repr__(self) -> str:
         state = "complete" if self.complete else "incomplete"
         return f"Results('{self.path}': {self._n_steps} steps, {state}, {self.kinematics}, {self.mesh!r})"

@@ -9,6 +9,7 @@ OTHERWISE = {
         "mesh file missing", "mesh file is a text file", "mesh file is empty", "mesh file is truncated",
         "suffix of no known format", "case file missing", "case is a folder", "result file missing", "`fastcontact profile` on a mesh file",
         "`fastcontact info` on a missing file", "export of a case file", "mesh written with an unknown suffix", "broken TOML",
+        "one of several supports in single brackets", "contact pair in double brackets",
     ),
     "an error that names the unknown group, without a suggestion": (
         "group of the material misspelled", "group of a support misspelled", "side of the contact misspelled",
@@ -20,6 +21,7 @@ OTHERWISE = {
         "one body without material", "material missing altogether", "no material at all", "one body without a material",
     ),
     "no message: the material is assigned to no solid, or to elements without stiffness": ("material assigned to lines",),
+    "the thickness is an input of the cells": ("thickness of a plane model",),
     "no message: the last definition is used": (
         "two materials for one body", "two materials for one group", "a material for all cells, and another for a group",
         "duplicate key", "contact pair defined twice in a case", "the same pair twice", "two pairs with one name",
@@ -66,6 +68,7 @@ OTHERWISE = {
     ),
     "an error in the assembly, or a third coordinate that is dropped silently": (
         "3D model of a plane mesh", "3D mesh for an axisymmetric model", "the file contains a 3D mesh",
+        "the mesh in the file lies in the x-z plane",
         "component that a plane mesh lacks", "a support in z of a plane model",
     ),
     "the job ends successfully, with displacements of 1e10 or NaN": (

@@ -66,6 +66,10 @@ def with_a_copy(mesh):
     return fc.Mesh(mesh.points, parts)
 
 
+def upright(mesh):
+    return mesh.replace(points=np.insert(mesh.points, 1, 0.0, axis=1))
+
+
 def in_space(source, target):
     fc.write_mesh(target, fc.generate.box())
 
@@ -87,6 +91,8 @@ MESHES = [
     ("the file contains only lines", rewritten(lines_only), r"the mesh has no solid cells, only line2"),
     ("a duplicate cell in the file", rewritten(with_a_copy),
      r"cell \d+ \(tri3 at \(.*\)\) occurs in the mesh 2 times \(number of such cells: 1\): remove the copies"),
+    ("the mesh in the file lies in the x-z plane", rewritten(upright),
+     r"kinematics 'axisymmetric' needs a mesh in the x-y plane, and this one has a third coordinate: turn it, or keep two coordinates, those of the x-z plane by mesh\.replace\(points=mesh\.points\[:, \[0, 2\]\]\)"),
     ("the file contains a 3D mesh", in_space, r"kinematics 'axisymmetric' cannot be used with a 3D mesh: use '3d'"),
 ]
 # fmt: on

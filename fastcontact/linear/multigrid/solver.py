@@ -242,7 +242,8 @@ class Multigrid:
                     break
                 raise StallError(
                     f"conjugate gradients stall at a relative residual of {cg.norm / scale:.1e} after {count} iterations, "
-                    f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
+                    f'above {self.tolerance:.1e}: use linear_solver="direct", which takes more memory, or look for thin or '
+                    "nearly incompressible parts, and for cells of very different sizes"
                 )
             if monitor is not None and unconverged and count >= first_monitor and count % MONITOR_INTERVAL == 0:
                 u = self._reduced.displacement(cg.x)

@@ -154,6 +154,10 @@ class Amg(Multigrid, LinearSolver):
             The given `error`, if the matrix is too large to be factorised.
         """
         if not self._may_factorise:
+            limit, n = MAX_FACTORISED_DOFS[self.K.blocksize[0]], self.K.shape[0]
+            error.args = (
+                f"{error}. No factorisation replaced multigrid, since {n} unknowns exceed the limit of {limit}",
+            )
             raise error
         if isinstance(error, TooManyIterationsError):
             reason = (

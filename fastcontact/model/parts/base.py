@@ -122,6 +122,11 @@ class ModelBase(NameSuggestions):
     ) -> None:
         check_known("kinematics", kinematics, KINEMATICS, ModelError)
         check_known("strain", strain, STRAINS, ModelError)
+        if kinematics != "3d" and mesh.dim == 3 and not mesh.solids:
+            raise ModelError(
+                f"kinematics '{kinematics}' needs a mesh in the x-y plane, and this one has a third coordinate: turn it, or "
+                "keep two coordinates, those of the x-z plane by mesh.replace(points=mesh.points[:, [0, 2]])"
+            )
         if (kinematics == "3d") != (mesh.dim == 3):
             possible = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
             raise ModelError(f"kinematics '{kinematics}' cannot be used with a {mesh.dim}D mesh: use {possible}")

@@ -289,3 +289,20 @@ def test_bodies_tied_by_relations_move_together():
     refused(fc.ModelError, r"1 rigid-body motion is not supported: body 'UPPER': translation along y", model.check)
     model.relate([("LOWER_TOP_LEFT", "y", 1.0), ("UPPER_BOTTOM_LEFT", "y", -1.0)])
     model.check()
+
+
+@pytest.mark.parametrize(
+    ("held", "body"),
+    [
+        ({"LOWER_BOTTOM": "x", "UPPER_TOP": "xy"}, "LOWER"),
+        ({"LOWER_BOTTOM": "xy", "UPPER_TOP": "x"}, "UPPER"),
+        ({"LOWER_BOTTOM": "xy"}, "UPPER"),
+    ],
+)
+def test_a_body_that_contact_lets_go_is_said_to_translate(held, body):
+    """It can also rotate about many points, and the axis of one such rotation lay ten widths away."""
+    model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain", **held)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.2)
+    refused(
+        fc.ModelError, rf"1 rigid-body motion is not supported: body '{body}': translation along y\. Fix", model.check
+    )

@@ -2,11 +2,13 @@
 
 import contextlib
 import dataclasses
+import gc
 import importlib.util
 import os
 import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -434,6 +436,15 @@ def test_an_open_old_file_can_still_be_read_when_a_new_one_takes_its_place(path:
         assert len(old) == 3
         assert_same(old[2], step_result(2))
     assert len(fc.open_results(path)) == 1
+
+
+def test_a_file_that_is_not_closed_closes_itself(path: Path) -> None:
+    write(path, 2)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert_same(fc.open_results(path)[-1], step_result(1))
+        gc.collect()
+    assert not told
 
 
 def test_a_second_writer_is_refused_and_damages_nothing(path: Path) -> None:
