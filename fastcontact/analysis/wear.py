@@ -96,13 +96,11 @@ def wear_compliance(
 def wear_work(depth: Array, earlier_depth: Array, forces: ContactForces, before: ContactForces | None) -> float:
     """Return the work of the normal forces in a load step on the increase of the wear depth (m,) [energy].
 
-    `forces` and `before` are the contact forces at the end and at the beginning of the step, None before the first step. As
-    in `work`, nodes that are open at either of them do not count.
+    `forces` and `before` are the contact forces at the end and at the beginning of the step, None before the first step.
     """
     if before is None:
         return 0.0
-    closed = (forces.pressing != 0.0) & (before.pressing != 0.0)
-    return 0.5 * float((forces.pressing + before.pressing)[closed] @ (depth - earlier_depth)[closed])
+    return 0.5 * float((forces.pressing_with(before) + before.pressing_with(forces)) @ (depth - earlier_depth))
 
 
 def linearisation_error(pair: Formulation, wear: WearCompliance, after: WearCompliance) -> float:

@@ -51,6 +51,8 @@ class ContactForces:
         Normal forces on the secondary nodes [force], and the contribution of clearances and wear to their gaps [length].
     stored : float
         Energy of penalties, normal and tangential [energy].
+    areas : ndarray (m,), optional
+        Areas of the constraints; None in restart data of early versions [area].
     """
 
     positions: Array
@@ -62,27 +64,51 @@ class ContactForces:
     pressing: Array
     added: Array
     stored: float
+    areas: Array | None = None
 
-    def at(self, positions: Array) -> tuple[Array, Array]:
-        """Return the pressures (q,) and tractions (q, dim) of the constraints nearest to `positions` (q, dim) [pressure]."""
-        if np.array_equal(positions, self.positions):
-            return self.pressure, self.traction
+    def at(self, positions: Array, areas: Array) -> tuple[Array, Array]:
+        """Return the normal (q,) and tangential (q, dim) forces at `positions` (q, dim) [force].
+
+        At other positions than those of these constraints, they are the tractions of the nearest constraint, times `areas`
+        (q,) [area] and a factor with which the sum of the normal forces is the same.
+        """
         if not len(self.positions):
             return np.zeros(len(positions)), np.zeros_like(positions)
+        own_areas = areas if self.areas is None else self.areas
+        if np.array_equal(positions, self.positions):
+            return own_areas * self.pressure, own_areas[:, None] * self.traction
         rows = nearest(self.positions, positions)[1]
-        return self.pressure[rows], self.traction[rows]
+        total = float((areas * np.abs(self.pressure[rows])).sum())
+        if self.areas is not None and total > 0.0:
+            areas = areas * float((own_areas * np.abs(self.pressure)).sum()) / total
+        return areas * self.pressure[rows], areas[:, None] * self.traction[rows]
+
+    def passed_on(self, other: ContactForces) -> float:
+        """Return the fraction of the normal forces without a force at the other end of the step that acts during the step.
+
+        `other` are the forces there. A contact that moves over a surface leaves as much force behind as it gains ahead. Where
+        its force at one end exceeds that at the other, this is the part that is compensated elsewhere.
+        """
+        excess = self.pressing - other.pressing
+        gained, lost = float(np.maximum(excess, 0.0).sum()), float(np.maximum(-excess, 0.0).sum())
+        return lost / max(gained, lost, TINY)
+
+    def pressing_with(self, other: ContactForces) -> Array:
+        """Return the normal forces (n_nodes,) that act on gaps during the step, if `other` are those at its other end."""
+        return self.pressing * np.where(other.pressing != 0.0, 1.0, self.passed_on(other))
 
     def normal_work(self, other: ContactForces, displacement: Array) -> tuple[float, float]:
         """Return half the work of normal forces in the step, and the energy of penalties where gaps open or close [energy].
 
         `other` are the forces at the other end of the step, and `displacement` (n_points, dim) the displacements in the step
-        [length]. The work is that at constraints that are closed at both ends, because no force acts on an open gap; the
-        energy is that of constraints without a force at the other end.
+        [length]. A constraint without a force at the other end contributes the fraction `passed_on` to the work, and the rest
+        to the energy.
         """
-        closed = other.at(self.positions)[0] != 0.0
+        closed = other.at(self.positions, np.ones(len(self.positions)))[0] != 0.0
+        fraction = np.where(closed, 1.0, self.passed_on(other))
         data, indices, start = self.rows
         opening = csr_array((data, indices, start), shape=(len(start) - 1, displacement.size)) @ displacement.ravel()
-        return -0.5 * float(opening[closed].sum()), 0.5 * float(self.energy[~closed].sum())
+        return -0.5 * float(fraction @ opening), 0.5 * float((1.0 - fraction) @ self.energy)
 
 
 @dataclass(frozen=True)
@@ -202,13 +228,17 @@ def contact_work(
             after, positions=after.positions[:0], rows=(np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)),
             energy=after.energy[:0], tangential=0.0 * after.tangential, pressing=0.0 * after.pressing, stored=0.0,
         )  # fmt: skip
-    pressure, traction = before.at(constraints.positions)
-    areas = constraints.finite_areas
-    normals, tangential = (pressure * areas, normal), (areas[:, None] * traction, force)
+    normal_before, force_before = before.at(constraints.positions, constraints.finite_areas)
+    normals, tangential = (normal_before, normal), (force_before, force)
+    left = (normal_before != 0.0) & ~constraints.usable
+    if left.any():  # They slide beyond the end of the other side, and have no rows.
+        nodes = pair.points[pair.secondary.points]
+        slips[left] = pair.nodal_slip(configuration)[nearest(nodes, constraints.positions[left])[1]]
     integrals = None if solution.integrals is None else solution.integrals[:, rows]
     work, touching, slip_integrals = _frictional_work(
-        pair, configuration, constraints, integrals, normals, tangential, slips
-    )
+        pair, configuration, constraints, integrals, normals, tangential, slips,
+        (after.passed_on(before), before.passed_on(after)),
+    )  # fmt: skip
     sliding = -0.5 * float(((tangential[0] + tangential[1]) * slips).sum())
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
@@ -216,15 +246,14 @@ def contact_work(
     work_after, energy_after = after.normal_work(before, displacement)
     work_before, energy_before = before.normal_work(after, displacement)
     gained = work_after + work_before + energy_after - energy_before
-    added_gap = np.where((after.pressing != 0.0) & (before.pressing != 0.0), after.added - before.added, 0.0)
-    gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)
+    gained -= 0.5 * float((after.pressing_with(before) + before.pressing_with(after)) @ (after.added - before.added))
     gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())
     return after, (float(work.sum()), touching, gained - (after.stored - before.stored) - sliding), slip_integrals
 
 
 def _frictional_work(
     pair: Formulation, configuration: Configuration, constraints: Constraints, integrals: Array | None,
-    normals: tuple[Array, Array], tangential: tuple[Array, Array], slips: Array,
+    normals: tuple[Array, Array], tangential: tuple[Array, Array], slips: Array, passed_on: tuple[float, float],
 ) -> tuple[Array, float, Array]:  # fmt: skip
     """Return the frictional work in a step, its part at constraints that close or open, and integrals of normal forces.
 
@@ -241,6 +270,8 @@ def _frictional_work(
         Normal and tangential forces at the beginning and at the end of the step [force].
     slips : ndarray (m, dim)
         Slip vectors [length].
+    passed_on : (float, float)
+        `ContactForces.passed_on` of the forces at the end and at the beginning of the step [-].
 
     Returns
     -------
@@ -254,11 +285,7 @@ def _frictional_work(
     (normal_before, normal), mu = normals, constraints.friction
     work_at_begin, work_at_end = (-0.5 * np.einsum("md,md->m", forces, slips) for forces in tangential)
     ratio = np.divide(normal_before, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
-    # A contact that moves over a surface leaves as much force behind as it gains ahead. Such a force acts during the complete
-    # step. `moved` and `moved_away` are the parts of the increase and of the decrease that compensate each other.
-    changes = normal - normal_before, normal_before - normal
-    increase, decrease = (float(np.maximum(change, 0.0).sum()) for change in changes)
-    moved, moved_away = (change / max(increase, decrease, TINY) for change in (decrease, increase))
+    moved, moved_away = passed_on
     # The work of all increments, in which constraints carry no force before they close.
     if integrals is not None:
         work, mean_force = integrals
@@ -330,12 +357,12 @@ def _forces(
     stored = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
     all_forces = np.column_stack([normal, tangents]).T
     amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
-    added = np.zeros(len(contact.gap))
+    nodes, added = pair.node_candidates, np.zeros(len(contact.gap))
     if pair.options.clearance is not None or configuration.wear_depth is not None:
-        gap_alone = pair.nodal_gap(configuration, with_clearance=False)[0]
-        np.subtract(contact.gap, gap_alone, out=added, where=np.isfinite(gap_alone) & np.isfinite(contact.gap))
+        added = pair.added_gap(nodes, pair.pair_candidates(nodes, configuration, np.inf), configuration)
     return ContactForces(
         constraints.positions, normal * inverse_area, force * inverse_area[:, None], penetration * normal,
         (rows.data, rows.indices, rows.indptr), nodal_forces.reshape(-1, dim),
         np.einsum("nd,nd->n", force_vectors, normals), added, 0.5 * (stored + float((amplitudes**2).sum())),
+        constraints.finite_areas,
     )  # fmt: skip
