@@ -1,9 +1,10 @@
 """Energy balance of a load step: strain energy, external work, frictional work, penalty energy, and imbalance.
 
 The work of a force in a step is integrated by the trapezoidal rule: it is the mean of the forces at the beginning and at
-the end, multiplied by the displacement. There are three exceptions. A normal force does no work on a gap that is open at the
-beginning or the end of the step. Sliding friction has its limit traction during the complete step, whatever it was at the
-beginning. If a contact moves over a surface, its force acts during the complete step, although constraints close and open.
+the end, multiplied by the displacement. There are two exceptions. Sliding friction has its limit traction during the complete
+step, whatever it was at the beginning. A normal force does no work on a gap that is open at the beginning or the end of the
+step, unless the contact moves over a surface: its force then acts during the complete step, although constraints close and
+open.
 
 The external work is the sum of the strain energy, the plastic and frictional work, the energies of penalties and cohesive
 layers, the work of contact pressures on the wear depth, and the imbalance. The imbalance is the work of contact forces at
@@ -19,7 +20,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.neighbours import nearest
-from fastcontact._tools.records import record
+from fastcontact._tools.records import field, record
 from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.configuration import Configuration
@@ -51,8 +52,8 @@ class ContactForces:
         Normal forces on the secondary nodes [force], and the contribution of clearances and wear to their gaps [length].
     stored : float
         Energy of penalties, normal and tangential [energy].
-    areas : ndarray (m,), optional
-        Areas of the constraints; None in restart data of early versions [area].
+    areas : ndarray (m,)
+        Areas of the constraints [area]; empty in restart data of early versions.
     """
 
     positions: Array
@@ -64,32 +65,42 @@ class ContactForces:
     pressing: Array
     added: Array
     stored: float
-    areas: Array | None = None
+    areas: Array = field(default_factory=np.empty(0).copy)
 
     def at(self, positions: Array, areas: Array) -> tuple[Array, Array]:
         """Return the normal (q,) and tangential (q, dim) forces at `positions` (q, dim) [force].
 
         At other positions than those of these constraints, they are the tractions of the nearest constraint, times `areas`
-        (q,) [area] and a factor with which the sum of the normal forces is the same.
+        (q,) [area] and a factor that preserves the sum of the normal forces.
         """
         if not len(self.positions):
             return np.zeros(len(positions)), np.zeros_like(positions)
-        own_areas = areas if self.areas is None else self.areas
         if np.array_equal(positions, self.positions):
-            return own_areas * self.pressure, own_areas[:, None] * self.traction
-        rows = nearest(self.positions, positions)[1]
-        total = float((areas * np.abs(self.pressure[rows])).sum())
-        if self.areas is not None and total > 0.0:
-            areas = areas * float((own_areas * np.abs(self.pressure)).sum()) / total
+            rows, areas = np.arange(len(positions)), self.areas if self.areas.size else areas
+        else:
+            rows = nearest(self.positions, positions)[1]
+            total = float((areas * np.abs(self.pressure[rows])).sum())
+            if self.areas.size and total > 0.0:
+                areas = areas * float((self.areas * np.abs(self.pressure)).sum()) / total
         return areas * self.pressure[rows], areas[:, None] * self.traction[rows]
 
-    def passed_on(self, other: ContactForces) -> float:
-        """Return the fraction of the normal forces without a force at the other end of the step that acts during the step.
+    def carried_to(self, positions: Array, areas: Array) -> tuple[Array, Array]:
+        """Return forces as `at` does, but each force acts at the nearest position with an area: resultants are preserved."""
+        carrying = np.flatnonzero(areas > 0.0)
+        if not (self.areas.size and len(carrying)) or np.array_equal(positions, self.positions):
+            return self.at(positions, areas)
+        rows, columns = carrying[nearest(positions[carrying], self.positions)[1]], np.arange(len(self.positions))
+        transfer = csr_array((self.areas, (rows, columns)), shape=(len(positions), len(columns)))
+        return transfer @ self.pressure, transfer @ self.traction
 
-        `other` are the forces there. A contact that moves over a surface leaves as much force behind as it gains ahead. Where
-        its force at one end exceeds that at the other, this is the part that is compensated elsewhere.
+    def passed_on(self, other: ContactForces) -> float:
+        """Return the part of the excess of normal forces over those at the other end of the step, `other`, that moves [-].
+
+        A contact that moves over a surface leaves as much force behind as it gains ahead. Such a force acts during the
+        complete step, also at constraints that close or open.
         """
-        excess = self.pressing - other.pressing
+        areas = self.areas if self.areas.size else np.ones(len(self.positions))
+        excess = areas * self.pressure - other.at(self.positions, areas)[0]
         gained, lost = float(np.maximum(excess, 0.0).sum()), float(np.maximum(-excess, 0.0).sum())
         return lost / max(gained, lost, TINY)
 
@@ -225,13 +236,14 @@ def contact_work(
     after = _forces(pair, configuration, constraints, normal, tangents, force, contact)
     if before is None:  # no forces before the first step
         before = replace(
-            after, positions=after.positions[:0], rows=(np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)),
+            after, positions=after.positions[:0], pressure=after.pressure[:0], areas=after.areas[:0],
+            rows=(np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)),
             energy=after.energy[:0], tangential=0.0 * after.tangential, pressing=0.0 * after.pressing, stored=0.0,
         )  # fmt: skip
-    normal_before, force_before = before.at(constraints.positions, constraints.finite_areas)
+    normal_before, force_before = before.carried_to(constraints.positions, constraints.finite_areas)
     normals, tangential = (normal_before, normal), (force_before, force)
     left = (normal_before != 0.0) & ~constraints.usable
-    if left.any():  # They slide beyond the end of the other side, and have no rows.
+    if left.any():  # Constraints that slide beyond the end of the other side have no slip there.
         nodes = pair.points[pair.secondary.points]
         slips[left] = pair.nodal_slip(configuration)[nearest(nodes, constraints.positions[left])[1]]
     integrals = None if solution.integrals is None else solution.integrals[:, rows]
@@ -271,7 +283,7 @@ def _frictional_work(
     slips : ndarray (m, dim)
         Slip vectors [length].
     passed_on : (float, float)
-        `ContactForces.passed_on` of the forces at the end and at the beginning of the step [-].
+        `ContactForces.passed_on` of the forces at the end, and of those at the beginning of the step [-].
 
     Returns
     -------
