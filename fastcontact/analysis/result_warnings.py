@@ -27,7 +27,7 @@ from fastcontact.contact.integration import areas_of_rule, fine_rule, lumped_are
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import Candidates
-from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.supported_nodes import nodes_with_undetermined_traction
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
@@ -603,7 +603,10 @@ def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: Contact
             f"a corner, the true maximum is between both: use smaller facets{remedy}"
         )
         return
-    normals = [nodal_normals(side, pair.points), *([contact.normal] if isinstance(pair.primary, Surface) else [])]
+    normals = [
+        DeformedSide(side, pair.points).nodal_normals,
+        *([contact.normal] if isinstance(pair.primary, Surface) else []),
+    ]
     at_corner = any((normal[near] @ normal[peak]).min() < SAME_DIRECTION for normal in normals)
     # If all of the contact is near its edge, the peak may be that in the middle.
     reaches_inside = (contact.active & (side.extended_adjacency @ near_open == 0)).any()
