@@ -157,8 +157,7 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
     for name, rows in constraints.rows.items():
         part, before = constraints.parts[name], step.state.forces.get(name)
         if before is not None and part.areas is not None and part.wetted is None:
-            pressure, shear = before.at(part.positions)
-            normal[rows], traction[rows] = part.finite_areas * pressure, part.finite_areas[:, None] * shear
+            normal[rows], traction[rows] = before.at(part.positions, part.finite_areas)
         elif name in step.state.touched and not part.equality.all():
             return None
     return normal, traction

@@ -173,11 +173,18 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
 
 
 def _excessive_wear(name: str, pair: Formulation, state: State) -> Iterator[str]:
-    """Yield a warning where the coefficient of wear is probably in another unit."""
-    if name not in state.worn or (factor := ratio_to_elastic_waves(pair, state.worn[name])) <= 1.0:
+    """Yield warnings about a coefficient of wear in another unit, and about a contact that moves too far in a load step."""
+    if name not in state.worn:
         return
-    depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
-    if factor > LARGEST_STEP_FACTOR or depth > WARNING_RATIO * size:
+    worn, factor = state.worn[name], ratio_to_elastic_waves(pair, state.worn[name])
+    if (passing := worn.passing / max(float(worn.depth.sum()), TINY)) > WARNING_RATIO:
+        yield (
+            f"contact '{name}' moves along '{pair.secondary.group}', and {passing:.0%} of the wear there is that of nodes in "
+            "the load step in which it reaches or leaves them. Depths deviate by up to this fraction from node to node, but "
+            f"the worn volume is accurate: use {passing / WARNING_RATIO:.2g} times as many load steps"
+        )
+    depth, size = float(worn.depth.max()), float(np.ptp(pair.points, axis=0).max())
+    if factor > LARGEST_STEP_FACTOR or (factor > 1.0 and depth > WARNING_RATIO * size):
         yield (
             f"contact '{name}' has a wear depth of {depth:.3g}, {depth / size:.2g} times the size of the model, and load "
             f"steps that are {factor:.2g} times too large for this wear: is the option 'wear' Archard's coefficient divided "
@@ -193,8 +200,8 @@ def _energy_imbalance(state: State) -> Iterator[str]:
             f"the energy of these load steps is out of balance: {work.imbalance:.3g} of the external work "
             f"{work.external:.4g} is neither strain energy ({work.strain_energy:.4g}), nor frictional work "
             f"({work.friction:.4g}), nor energy of penalties, {abs(work.imbalance) / work.largest:.1%} of the largest of "
-            "them: use more load steps if energies matter, or exchange the sides if the contact area moves along the "
-            "secondary side"
+            "them. If energies matter, use more load steps. If the contact area moves along the secondary side, exchange the "
+            "sides instead, or use smaller facets"
         )
 
 
@@ -210,9 +217,10 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
         fraction = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         hint = "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
         yield (
-            f"{fraction:.0%} of the work of friction is done at nodes in the load step in which they "
-            "close, or contact is lost, where the slip is that of the complete step, not only that in contact: the work of "
-            f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{hint}"
+            f"{fraction:.0%} of the work of friction is done at nodes in the load step in which they close, or contact is "
+            "lost, where the slip is that of the complete step, not only that in contact: the work of friction is too large "
+            "by up to this part, and the shear at the edge of the contact is inaccurate; errors of pressures are much "
+            f"smaller. If the work or the shear matters, use more load steps{hint}"
         )
 
 

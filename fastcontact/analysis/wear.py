@@ -18,6 +18,7 @@ from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.wear_compliance import WearCompliance
 from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
+from fastcontact.round_off import TINY
 
 
 class Worn(NamedTuple):
@@ -29,11 +30,14 @@ class Worn(NamedTuple):
         Wear depth at the secondary nodes [length], and the pressure there [pressure].
     largest_rate : float
         Largest ratio of the wear depth of a node in one step to its mean pressure in this step [length / pressure].
+    passing : float
+        Sum over nodes of the wear depths of load steps in which a moving contact reaches or leaves them [length].
     """
 
     depth: Array
     pressure: Array
     largest_rate: float = 0.0
+    passing: float = 0.0
 
     @classmethod
     def nothing(cls, count: int) -> Worn:
@@ -45,7 +49,11 @@ class Worn(NamedTuple):
         depth = wear_depth_in_step(pair, configuration, result, self.pressure, coefficient)
         mean = _linear_on_facets(pair, 0.5 * np.maximum(result.pressure + self.pressure, 0.0))
         largest_rate = np.divide(depth, mean, out=np.zeros_like(depth), where=mean > 0.0)
-        return Worn(self.depth + depth, result.pressure, max(self.largest_rate, float(largest_rate.max(initial=0.0))))
+        change, one_end = result.pressure - self.pressure, (result.pressure > 0.0) != (self.pressure > 0.0)
+        gained, lost = float(np.maximum(change, 0.0).sum()), float(np.maximum(-change, 0.0).sum())
+        passing = float(depth[one_end].sum()) * min(gained, lost) / max(gained, lost, TINY)
+        largest_rates = max(self.largest_rate, float(largest_rate.max(initial=0.0)))
+        return Worn(self.depth + depth, result.pressure, largest_rates, self.passing + passing)
 
 
 def wear_depth_in_step(
@@ -96,13 +104,11 @@ def wear_compliance(
 def wear_work(depth: Array, earlier_depth: Array, forces: ContactForces, before: ContactForces | None) -> float:
     """Return the work of the normal forces in a load step on the increase of the wear depth (m,) [energy].
 
-    `forces` and `before` are the contact forces at the end and at the beginning of the step, None before the first step. As
-    in `work`, nodes that are open at either of them do not count.
+    `forces` and `before` are the contact forces at the end and at the beginning of the step, None before the first step.
     """
     if before is None:
         return 0.0
-    closed = (forces.pressing != 0.0) & (before.pressing != 0.0)
-    return 0.5 * float((forces.pressing + before.pressing)[closed] @ (depth - earlier_depth)[closed])
+    return 0.5 * float((forces.pressing_with(before) + before.pressing_with(forces)) @ (depth - earlier_depth))
 
 
 def linearisation_error(pair: Formulation, wear: WearCompliance, after: WearCompliance) -> float:

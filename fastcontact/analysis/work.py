@@ -1,9 +1,10 @@
 """Energy balance of a load step: strain energy, external work, frictional work, penalty energy, and imbalance.
 
 The work of a force in a step is integrated by the trapezoidal rule: it is the mean of the forces at the beginning and at
-the end, multiplied by the displacement. There are three exceptions. A normal force does no work on a gap that is open at the
-beginning or the end of the step. Sliding friction has its limit traction during the complete step, whatever it was at the
-beginning. If a contact moves over a surface, its force acts during the complete step, although constraints close and open.
+the end, multiplied by the displacement. There are two exceptions. Sliding friction has its limit traction during the complete
+step, whatever it was at the beginning. A normal force does no work on a gap that is open at the beginning or the end of the
+step, unless the contact moves over a surface: its force then acts during the complete step, although constraints close and
+open.
 
 The external work is the sum of the strain energy, the plastic and frictional work, the energies of penalties and cohesive
 layers, the work of contact pressures on the wear depth, and the imbalance. The imbalance is the work of contact forces at
@@ -19,7 +20,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.neighbours import nearest
-from fastcontact._tools.records import record
+from fastcontact._tools.records import field, record
 from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.configuration import Configuration
@@ -51,6 +52,8 @@ class ContactForces:
         Normal forces on the secondary nodes [force], and the contribution of clearances and wear to their gaps [length].
     stored : float
         Energy of penalties, normal and tangential [energy].
+    areas : ndarray (m,)
+        Areas of the constraints [area]; empty in restart data of early versions.
     """
 
     positions: Array
@@ -62,27 +65,61 @@ class ContactForces:
     pressing: Array
     added: Array
     stored: float
+    areas: Array = field(default_factory=np.empty(0).copy)
 
-    def at(self, positions: Array) -> tuple[Array, Array]:
-        """Return the pressures (q,) and tractions (q, dim) of the constraints nearest to `positions` (q, dim) [pressure]."""
-        if np.array_equal(positions, self.positions):
-            return self.pressure, self.traction
+    def at(self, positions: Array, areas: Array) -> tuple[Array, Array]:
+        """Return the normal (q,) and tangential (q, dim) forces at `positions` (q, dim) [force].
+
+        At other positions than those of these constraints, they are the tractions of the nearest constraint, times `areas`
+        (q,) [area] and a factor that preserves the sum of the normal forces.
+        """
         if not len(self.positions):
             return np.zeros(len(positions)), np.zeros_like(positions)
-        rows = nearest(self.positions, positions)[1]
-        return self.pressure[rows], self.traction[rows]
+        if np.array_equal(positions, self.positions):
+            rows, areas = np.arange(len(positions)), self.areas if self.areas.size else areas
+        else:
+            rows = nearest(self.positions, positions)[1]
+            total = float((areas * np.abs(self.pressure[rows])).sum())
+            if self.areas.size and total > 0.0:
+                areas = areas * float((self.areas * np.abs(self.pressure)).sum()) / total
+        return areas * self.pressure[rows], areas[:, None] * self.traction[rows]
+
+    def carried_to(self, positions: Array, areas: Array) -> tuple[Array, Array]:
+        """Return forces as `at` does, but each force acts at the nearest position with an area: resultants are preserved."""
+        carrying = np.flatnonzero(areas > 0.0)
+        if not (self.areas.size and len(carrying)) or np.array_equal(positions, self.positions):
+            return self.at(positions, areas)
+        rows, columns = carrying[nearest(positions[carrying], self.positions)[1]], np.arange(len(self.positions))
+        transfer = csr_array((self.areas, (rows, columns)), shape=(len(positions), len(columns)))
+        return transfer @ self.pressure, transfer @ self.traction
+
+    def passed_on(self, other: ContactForces) -> float:
+        """Return the part of the excess of normal forces over those at the other end of the step, `other`, that moves [-].
+
+        A contact that moves over a surface leaves as much force behind as it gains ahead. Such a force acts during the
+        complete step, also at constraints that close or open.
+        """
+        areas = self.areas if self.areas.size else np.ones(len(self.positions))
+        excess = areas * self.pressure - other.at(self.positions, areas)[0]
+        gained, lost = float(np.maximum(excess, 0.0).sum()), float(np.maximum(-excess, 0.0).sum())
+        return lost / max(gained, lost, TINY)
+
+    def pressing_with(self, other: ContactForces) -> Array:
+        """Return the normal forces (n_nodes,) that act on gaps during the step, if `other` are those at its other end."""
+        return self.pressing * np.where(other.pressing != 0.0, 1.0, self.passed_on(other))
 
     def normal_work(self, other: ContactForces, displacement: Array) -> tuple[float, float]:
         """Return half the work of normal forces in the step, and the energy of penalties where gaps open or close [energy].
 
         `other` are the forces at the other end of the step, and `displacement` (n_points, dim) the displacements in the step
-        [length]. The work is that at constraints that are closed at both ends, because no force acts on an open gap; the
-        energy is that of constraints without a force at the other end.
+        [length]. A constraint without a force at the other end contributes the fraction `passed_on` to the work, and the rest
+        to the energy.
         """
-        closed = other.at(self.positions)[0] != 0.0
+        closed = other.at(self.positions, np.ones(len(self.positions)))[0] != 0.0
+        fraction = np.where(closed, 1.0, self.passed_on(other))
         data, indices, start = self.rows
         opening = csr_array((data, indices, start), shape=(len(start) - 1, displacement.size)) @ displacement.ravel()
-        return -0.5 * float(opening[closed].sum()), 0.5 * float(self.energy[~closed].sum())
+        return -0.5 * float(fraction @ opening), 0.5 * float((1.0 - fraction) @ self.energy)
 
 
 @dataclass(frozen=True)
@@ -199,16 +236,21 @@ def contact_work(
     after = _forces(pair, configuration, constraints, normal, tangents, force, contact)
     if before is None:  # no forces before the first step
         before = replace(
-            after, positions=after.positions[:0], rows=(np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)),
+            after, positions=after.positions[:0], pressure=after.pressure[:0], areas=after.areas[:0],
+            rows=(np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)),
             energy=after.energy[:0], tangential=0.0 * after.tangential, pressing=0.0 * after.pressing, stored=0.0,
         )  # fmt: skip
-    pressure, traction = before.at(constraints.positions)
-    areas = constraints.finite_areas
-    normals, tangential = (pressure * areas, normal), (areas[:, None] * traction, force)
+    normal_before, force_before = before.carried_to(constraints.positions, constraints.finite_areas)
+    normals, tangential = (normal_before, normal), (force_before, force)
+    left = (normal_before != 0.0) & ~constraints.usable
+    if left.any():  # Constraints that slide beyond the end of the other side have no slip there.
+        nodes = pair.points[pair.secondary.points]
+        slips[left] = pair.nodal_slip(configuration)[nearest(nodes, constraints.positions[left])[1]]
     integrals = None if solution.integrals is None else solution.integrals[:, rows]
     work, touching, slip_integrals = _frictional_work(
-        pair, configuration, constraints, integrals, normals, tangential, slips
-    )
+        pair, configuration, constraints, integrals, normals, tangential, slips,
+        (after.passed_on(before), before.passed_on(after)),
+    )  # fmt: skip
     sliding = -0.5 * float(((tangential[0] + tangential[1]) * slips).sum())
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
@@ -216,15 +258,14 @@ def contact_work(
     work_after, energy_after = after.normal_work(before, displacement)
     work_before, energy_before = before.normal_work(after, displacement)
     gained = work_after + work_before + energy_after - energy_before
-    added_gap = np.where((after.pressing != 0.0) & (before.pressing != 0.0), after.added - before.added, 0.0)
-    gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)
+    gained -= 0.5 * float((after.pressing_with(before) + before.pressing_with(after)) @ (after.added - before.added))
     gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())
     return after, (float(work.sum()), touching, gained - (after.stored - before.stored) - sliding), slip_integrals
 
 
 def _frictional_work(
     pair: Formulation, configuration: Configuration, constraints: Constraints, integrals: Array | None,
-    normals: tuple[Array, Array], tangential: tuple[Array, Array], slips: Array,
+    normals: tuple[Array, Array], tangential: tuple[Array, Array], slips: Array, passed_on: tuple[float, float],
 ) -> tuple[Array, float, Array]:  # fmt: skip
     """Return the frictional work in a step, its part at constraints that close or open, and integrals of normal forces.
 
@@ -241,6 +282,8 @@ def _frictional_work(
         Normal and tangential forces at the beginning and at the end of the step [force].
     slips : ndarray (m, dim)
         Slip vectors [length].
+    passed_on : (float, float)
+        `ContactForces.passed_on` of the forces at the end, and of those at the beginning of the step [-].
 
     Returns
     -------
@@ -254,11 +297,7 @@ def _frictional_work(
     (normal_before, normal), mu = normals, constraints.friction
     work_at_begin, work_at_end = (-0.5 * np.einsum("md,md->m", forces, slips) for forces in tangential)
     ratio = np.divide(normal_before, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
-    # A contact that moves over a surface leaves as much force behind as it gains ahead. Such a force acts during the complete
-    # step. `moved` and `moved_away` are the parts of the increase and of the decrease that compensate each other.
-    changes = normal - normal_before, normal_before - normal
-    increase, decrease = (float(np.maximum(change, 0.0).sum()) for change in changes)
-    moved, moved_away = (change / max(increase, decrease, TINY) for change in (decrease, increase))
+    moved, moved_away = passed_on
     # The work of all increments, in which constraints carry no force before they close.
     if integrals is not None:
         work, mean_force = integrals
@@ -330,12 +369,12 @@ def _forces(
     stored = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
     all_forces = np.column_stack([normal, tangents]).T
     amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
-    added = np.zeros(len(contact.gap))
+    nodes, added = pair.node_candidates, np.zeros(len(contact.gap))
     if pair.options.clearance is not None or configuration.wear_depth is not None:
-        gap_alone = pair.nodal_gap(configuration, with_clearance=False)[0]
-        np.subtract(contact.gap, gap_alone, out=added, where=np.isfinite(gap_alone) & np.isfinite(contact.gap))
+        added = pair.added_gap(nodes, pair.pair_candidates(nodes, configuration, np.inf), configuration)
     return ContactForces(
         constraints.positions, normal * inverse_area, force * inverse_area[:, None], penetration * normal,
         (rows.data, rows.indices, rows.indptr), nodal_forces.reshape(-1, dim),
         np.einsum("nd,nd->n", force_vectors, normals), added, 0.5 * (stored + float((amplitudes**2).sum())),
+        constraints.finite_areas,
     )  # fmt: skip
