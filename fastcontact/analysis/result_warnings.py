@@ -100,15 +100,18 @@ def result_warnings(
         oscillation = oscillation or list(_quadrature_error(pair, configuration, contact, problem.model))
         pressures = [*unresolved, *oscillation]
         index, displacement, contacts = peaks[name]
+        at_edge = list(_pressure_peak_at_edge(pair, last, contact))
         if not pressures and index != last.index:
             peak = contacts[name]
             at_peak = replace(Configuration.displaced(displacement), pose=_pose(peak))
-            texts = _unresolved(problem, pair, at_peak, peak, state) + list(
-                pressure_oscillation(pair, peak, problem.model)
-            )
+            texts = [
+                *_unresolved(problem, pair, at_peak, peak, state),
+                *pressure_oscillation(pair, peak, problem.model),
+            ]
+            texts += [] if at_edge else _pressure_peak_at_edge(pair, last, peak)
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += pressures or _shear_oscillation(pair, contact)
-        warnings += [*_pressure_peak_at_edge(pair, last, contact), *_sliding_past_ends(pair, contact)]
+        warnings += [*at_edge, *_sliding_past_ends(pair, contact)]
         warnings += _excessive_wear(name, pair, state)
     warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_energy_imbalance(state)]
     return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]

@@ -23,15 +23,16 @@ def told(model: fc.Model, steps: int) -> tuple[fc.StepResult, list[str]]:
     return last, list(last.warnings)
 
 
-def below_a_ball(formulation: str, divisions: int, law=None) -> tuple[float, list[str]]:
+def below_a_ball(formulation: str, divisions: int, law=None, steps=5, ramp=None) -> tuple[float, list[str]]:
     """Return the largest nodal pressure below a ball, and the warnings."""
     mesh = fc.generate.block((1.0, 0.5), (divisions, divisions // 2), element="quad8")
     model = fc.Model(mesh, "axisymmetric", strain="finite")
     model.add_material(law or fc.ElasticPlastic(200e3, 0.3, yield_stress=300.0, hardening=[(0.0, 300.0), (0.2, 450.0)]))
     supported(model, BOTTOM="y", LEFT="x")
     ball = fc.obstacles.Sphere((0.0, 2.5), 2.0)
-    model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.04}, formulation=formulation)
-    last, texts = told(model, 5)
+    options = {"formulation": formulation, "ramp": ramp}
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.04}, **options)
+    last, texts = told(model, steps)
     return last.contact["ball"].pressure_max, texts
 
 
@@ -48,6 +49,8 @@ def test_pressures_overshoot_at_the_edge_past_yield() -> None:
     largest, (text,) = below_a_ball("mortar", 12)
     assert text.startswith("the plastic flow turns")
     assert largest == pytest.approx(fine, rel=0.1)
+    _, texts = below_a_ball("continuous", 12, steps=6, ramp=[(0.0, 0.0), (5 / 6, 1.0), (1.0, 0.9)])
+    assert any(re.match("in load step 5, where its force is largest, " + EDGE, text) for text in texts)
     _, texts = below_a_ball("continuous", 12, fc.LinearElastic(200e3, 0.3))
     assert not any(re.match(EDGE, text) for text in texts)
 
