@@ -81,14 +81,12 @@ def graded_block(
         if dim == 2:
             refuse(element, contact_radius_y=contact_radius_y)
         radii[1] = positive("contact_radius_y", contact_radius_y, width, "width")
-    coarse_size = width / 4 if size is None else positive("size", size, width, "width")
-    fine_size = min(min(radii) / 10, coarse_size)
-    if contact_size is not None:
-        fine_size = positive("contact_size", contact_size, coarse_size, "size")
-    reach = max(coarse_size - fine_size, fine_size) / positive("growth", growth, 1.0)
+    size = width / 4 if size is None else positive("size", size, width, "width")
+    finest = min(min(radii) / 10, size) if contact_size is None else positive("contact_size", contact_size, size, "size")
+    reach = max(size - finest, finest) / positive("growth", growth, 1.0)
 
     def coordinates(length: float, plateau: float) -> Array:
-        return graded_positions(length, Spacing(fine_size, coarse_size, plateau=plateau, reach=plateau + reach))
+        return graded_positions(length, Spacing(finest, size, plateau=plateau, reach=plateau + reach))
 
     lines = [*(coordinates(width, radius) for radius in radii), -coordinates(depth, min(*radii, 2 * depth) / 2)[::-1]]
     return _with_groups(mesh_on_lines(element, lines), lines, radii)
