@@ -82,11 +82,12 @@ def graded_block(
             refuse(element, contact_radius_y=contact_radius_y)
         radii[1] = positive("contact_radius_y", contact_radius_y, width, "width")
     size = width / 4 if size is None else positive("size", size, width, "width")
-    finest = min(min(radii) / 10, size) if contact_size is None else positive("contact_size", contact_size, size, "size")
-    reach = max(size - finest, finest) / positive("growth", growth, 1.0)
+    # h is the edge length at the contact, and `size` that far from it.
+    h = min(min(radii) / 10, size) if contact_size is None else positive("contact_size", contact_size, size, "size")
+    reach = max(size - h, h) / positive("growth", growth, 1.0)
 
     def coordinates(length: float, plateau: float) -> Array:
-        return graded_positions(length, Spacing(finest, size, plateau=plateau, reach=plateau + reach))
+        return graded_positions(length, Spacing(h, size, plateau=plateau, reach=plateau + reach))
 
     lines = [*(coordinates(width, radius) for radius in radii), -coordinates(depth, min(*radii, 2 * depth) / 2)[::-1]]
     return _with_groups(mesh_on_lines(element, lines), lines, radii)
