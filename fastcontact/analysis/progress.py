@@ -10,11 +10,12 @@ from fastcontact._jit import compiling
 from fastcontact.analysis import step_halving
 from fastcontact.results.step import StepResult
 
-WIDTH = 30
+# Number of characters of the bar, and number of characters reserved for its brackets and the text.
+WIDTH, TEXT_WIDTH = 30, 54
 
 
 class StatusLine:
-    """A status line of `width` characters on standard error, shown only if `show`."""
+    """A status line of `width` characters on standard error, shown only if `show` is true."""
 
     def __init__(self, width: int, show: bool) -> None:
         self._width, self._show = width, show
@@ -22,14 +23,14 @@ class StatusLine:
         self._reported = False
 
     def __enter__(self) -> Self:
-        compiling.listeners.append(self._compiling)
+        compiling.listeners.append(self._report_compilation)
         return self
 
     def __exit__(self, *_: object) -> None:
-        compiling.listeners.remove(self._compiling)
+        compiling.listeners.remove(self._report_compilation)
         self.close()
 
-    def _compiling(self) -> None:
+    def _report_compilation(self) -> None:
         if not self._reported:
             self._reported = True
             self.draw(compiling.ANNOUNCEMENT)
@@ -47,22 +48,25 @@ class StatusLine:
 
 
 class Progress(StatusLine):
-    """Progress of a run: completed load steps, nodes in contact, remaining time, and bisections of steps."""
+    """Progress of a run: completed load steps, nodes in contact, remaining time, and bisections of steps.
+
+    The run has `total` steps, of which `done` are complete at the beginning.
+    """
 
     def __init__(self, total: int, show: bool, done: int = 0) -> None:
-        super().__init__(WIDTH + 54, show)
-        self._total, self._before = total, done
+        super().__init__(WIDTH + TEXT_WIDTH, show)
+        self._total, self._n_untimed = total, done
         self._compiled = compiling.count
 
     def __enter__(self) -> Self:
-        step_halving.listeners.append(self._halved)
+        step_halving.listeners.append(self._report_halving)
         return super().__enter__()
 
     def __exit__(self, *raised: object) -> None:
-        step_halving.listeners.remove(self._halved)
+        step_halving.listeners.remove(self._report_halving)
         super().__exit__(*raised)
 
-    def _halved(self, index: int, begin: float, end: float) -> None:
+    def _report_halving(self, index: int, begin: float, end: float) -> None:
         self.draw(f"step {index}/{self._total} does not converge, cut in halves: {begin:.6g} to {end:.6g}")
 
     def step(self, step: StepResult, complete: int | None = None) -> None:
@@ -78,7 +82,7 @@ class Progress(StatusLine):
     def _remaining_time(self, index: int) -> str:
         """Return the text of the remaining time after a step; empty if kernels were compiled in this step."""
         if self._compiled != compiling.count:  # not representative of the following steps
-            self._compiled, self._before, self._started = compiling.count, index, time.perf_counter()
+            self._compiled, self._n_untimed, self._started = compiling.count, index, time.perf_counter()
             return ""
-        seconds_per_step = (time.perf_counter() - self._started) / max(index - self._before, 1)
+        seconds_per_step = (time.perf_counter() - self._started) / max(index - self._n_untimed, 1)
         return f", {seconds_per_step * (self._total - index):.0f} s left"

@@ -22,10 +22,10 @@ PLANE = ("plane_strain", "plane_stress")
 def number(name: str, value: object) -> float:
     """Return `value` as a finite float, or raise ModelError."""
     # The comparison precedes the conversion, since an integer may exceed the range of floats. NaN compares false.
-    size: Any = abs(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
-    if not size < math.inf:
+    magnitude: Any = abs(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
+    if not magnitude < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
-    if size > LARGEST:
+    if magnitude > LARGEST:
         raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g}, whatever its unit")
     return float(value)  # type: ignore[arg-type]
 
@@ -110,17 +110,17 @@ class Bodies:
     @property
     def E_star(self) -> float:
         """Contact modulus [pressure], 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Johnson 1985, section 4.2)."""
-        return 1.0 / sum((1.0 - nu**2) / E for E, nu in self._elastic)
+        return 1.0 / sum((1.0 - nu**2) / E for E, nu in self._elastic_constants)
 
     @property
     def E_star_plane_stress(self) -> float:
         """Contact modulus [pressure] of two thin discs, 1/E* = 1/E1 + 1/E2."""
-        return 1.0 / sum(1.0 / E for E, _ in self._elastic)
+        return 1.0 / sum(1.0 / E for E, _ in self._elastic_constants)
 
     @property
     def G_star(self) -> float:
         """Tangential modulus [pressure], 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 with shear moduli G (Mindlin 1949)."""
-        return 1.0 / sum(2.0 * (2.0 - nu) * (1.0 + nu) / E for E, nu in self._elastic)
+        return 1.0 / sum(2.0 * (2.0 - nu) * (1.0 + nu) / E for E, nu in self._elastic_constants)
 
     @property
     def dundurs(self) -> float:
@@ -130,8 +130,8 @@ class Bodies:
         return 0.5 * (first - second) * self.E_star
 
     @property
-    def _elastic(self) -> list[tuple[float, float]]:
-        """E and nu of the bodies that are not rigid."""
+    def _elastic_constants(self) -> list[tuple[float, float]]:
+        """Young's modulus [pressure] and Poisson's ratio [-] of each body that is not rigid."""
         first = [(self.E1, self.nu1)]
         return first if self.E2 is None else [*first, (self.E2, self.nu2)]
 
@@ -139,9 +139,9 @@ class Bodies:
         """Return E and nu of body 1 or 2; ModelError for other numbers and for a rigid body."""
         if body not in (1, 2):
             raise ModelError(f"body is {body!r}: it must be 1 or 2")
-        if body > len(self._elastic):
+        if body > len(self._elastic_constants):
             raise ModelError("body 2 is rigid (E2 is None): it has no displacement field, request body 1")
-        return self._elastic[body - 1]
+        return self._elastic_constants[body - 1]
 
 
 def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")) -> float:
@@ -164,9 +164,9 @@ def check_plane(kinematics: str) -> str:
 
 
 def quantities(laws: Mapping[str, tuple[float, float]], name: str, value: float) -> dict[str, float]:
-    """Return all quantities ``coefficient * radius**exponent`` of a contact from the `value` of the one called `name`.
+    """Return the quantities of a contact by name, given the `value` of the one called `name`.
 
-    `laws` contains the coefficient and the exponent of each quantity by name.
+    Each quantity is ``coefficient * radius**exponent``. `laws` contains the coefficients and the exponents by name.
 
     Examples
     --------

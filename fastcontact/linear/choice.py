@@ -87,7 +87,7 @@ def check_tolerance(tolerance: float) -> None:
 
 
 def limited_tolerance(tolerance: float, relative: float) -> float:
-    """Return the smaller of a checked `tolerance` and the criterion `relative` on the residual force."""
+    """Check `tolerance`, and return the smaller of it and the criterion `relative` on the residual force."""
     check_tolerance(tolerance)
     if tolerance > relative:
         log.info("linear solver: the tolerance %.1e is reduced to the residual criterion %.1e", tolerance, relative)

@@ -17,7 +17,7 @@ from fastcontact.cases.summary import finite_or_none
 from fastcontact.results.units import axis_label
 from fastcontact.studies.fit import CONFIDENCE, Limit
 from fastcontact.studies.quantities import RATIOS, column, title
-from fastcontact.studies.report import Report, Rows, format_axes, marker, message, number, panels, percent, to_rows
+from fastcontact.studies.report import Report, Rows, format_axes, marker, number, panels, percent, show_message, to_rows
 from fastcontact.studies.series import Series, Split
 
 # Quantities that the report discusses in sentences, in this order.
@@ -259,7 +259,7 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     """Draw the mesh error of a quantity against h with logarithmic axes, error bars, fits and slope triangles."""
     fitted = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not fitted:
-        return message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
+        return show_message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
     has_bars = len(fitted) <= MOST_CURVES_WITH_BARS
     for position, (k, series) in enumerate(fitted):
         limit, h = series.limits[quantity], np.array(series.h)
@@ -310,7 +310,7 @@ def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> No
 def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]) -> None:
     """Draw the contact pressure of all levels and of the theory against the distance from the middle of the contact."""
     if not series.finest.profile:
-        return message(ax, "this case has no contact pair,\nso there is no contact pressure")
+        return show_message(ax, "this case has no contact pair,\nso there is no contact pressure")
     from matplotlib import colormaps
 
     profiles = [(np.array(level.profile["r"]), np.array(level.profile["pressure"])) for level in series.levels]
@@ -350,7 +350,7 @@ def draw_differences(ax: Any, all_series: Sequence[Series], best: Series, units:
     quantity = "pressure_max"
     compared = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
     if not compared:
-        return message(ax, f"no theory of the {title(quantity)}, or no limit")
+        return show_message(ax, f"no theory of the {title(quantity)}, or no limit")
     for k, series in compared:
         differences = [100 * value for value in series.from_theory(quantity)]
         ax.plot(series.h, differences, f"{marker(k)}-", ms=5, lw=1.0, label=str(series.combination))
@@ -467,6 +467,6 @@ class Study(Report):
             plots.append(partial(draw_differences, best=self.best, **options))
         rows, columns = (len(plots) + 1) // 2, min(2, len(plots))
         axes = panels((rows, columns), (6.0 * columns, 4.6 * rows), self.title)
-        for ax, draw in itertools.zip_longest(axes.flat, plots, fillvalue=partial(message, text="")):
+        for ax, draw in itertools.zip_longest(axes.flat, plots, fillvalue=partial(show_message, text="")):
             draw(ax)
         return axes[0, 0].figure

@@ -1,11 +1,12 @@
-"""Errors of a finite-element solution: norms of its difference from a theory, and estimates for each cell.
+"""Errors of a finite-element solution: norms of its difference from an exact solution, and estimates for each cell.
 
 The norms are computed by quadrature, for convergence studies with exact solutions such as `analytic.hertz_box`. Errors at the
 nodes are not suitable, because they often converge faster than errors within the cells.
 
-The estimates need no theory. The smoothed stress is more accurate than the stress of the solution, and the difference of the
-two is an estimate of the error (Zienkiewicz and Zhu, 1987). On the contact surface, the difference between the smoothed
-normal stress and the contact pressure is added, as in residual-based estimates (for example Wriggers and Scherf, 1998).
+The estimates need no exact solution. The smoothed stress is more accurate than the stress of the solution, and the difference
+of the two is an estimate of the error (Zienkiewicz and Zhu, 1987). On the contact surface, the difference between the
+smoothed normal stress and the contact pressure is added, as in residual-based estimates (for example Wriggers and Scherf,
+1998).
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 # Largest number of quadrature points that are evaluated at a time, which limits the memory of intermediate arrays.
 POINTS_PER_BATCH = 100_000
-CellArrays = tuple[Array, Array, Array, Array]  # see `_stress_in_cells`
+CellArrays = tuple[Array, Array, Array, Array]  # see `_cell_arrays`
 
 
 class Theory(Protocol):
@@ -59,22 +60,22 @@ class Theory(Protocol):
 
 @dataclass(frozen=True)
 class ErrorNorms:
-    """Norms of the error of a solution, and of the theory with which it is compared.
+    """Norms of the error of a solution, and of the exact solution with which it is compared.
 
     The energy norm of a stress field s is the square root of the integral of s : C^-1 : s, with the elastic moduli C; this
     integral is twice the elastic energy. The L2 norm of a displacement field is the square root of the integral of its
-    square. In axisymmetry integrals extend over the full circle.
+    square. In axisymmetry integrals extend over the full circle, and dim is 3 in the units below.
 
     Attributes
     ----------
     energy : float
-        Energy norm of the difference between solution and theory [(force length)^(1/2)].
+        Energy norm of the difference between the two solutions [energy^(1/2)].
     displacement : float
-        L2 norm of the difference between solution and theory [length^(1 + dim/2)].
+        L2 norm of the difference between the two displacements [length^(1 + dim/2)].
     energy_of_theory : float
-        Energy norm of the theory [(force length)^(1/2)].
+        Energy norm of the exact solution [energy^(1/2)].
     displacement_of_theory : float
-        L2 norm of the displacement of the theory [length^(1 + dim/2)].
+        L2 norm of the exact displacement [length^(1 + dim/2)].
 
     Examples
     --------
@@ -93,12 +94,12 @@ class ErrorNorms:
 
     @property
     def relative_energy(self) -> float:
-        """Energy norm of the error divided by the energy norm of the theory [-]."""
+        """Energy norm of the error divided by the energy norm of the exact solution [-]."""
         return self.energy / self.energy_of_theory
 
     @property
     def relative_displacement(self) -> float:
-        """L2 norm of the error of the displacement divided by the L2 norm of the displacement of the theory [-]."""
+        """L2 norm of the error of the displacement divided by the L2 norm of the exact displacement [-]."""
         return self.displacement / self.displacement_of_theory
 
 
@@ -112,7 +113,7 @@ def error_against(
     n_points: int | None = None,
     rise: Array | None = None,
 ) -> ErrorNorms:
-    """Return the norms of the difference between a finite-element solution and a theory.
+    """Return the norms of the difference between a finite-element solution and an exact solution.
 
     Both are evaluated at the same quadrature points in the reference configuration. The stresses of the solution follow from
     the derivatives of its displacements there, without averaging (Zienkiewicz and Taylor, 2000, section 14.1).
@@ -122,7 +123,8 @@ def error_against(
     theory : Theory
         An object with methods ``displacement(points)`` and ``stress(points)``, such as `analytic.hertz_box`.
     model : Model
-        The model of the solution; only its mesh, kinematics, materials and initial states are used.
+        The model of the solution; only its mesh, kinematics, materials and initial states are used. Initial stresses and
+        strains have the multiplier 1.
     displacement : array_like (n_points, dim)
         Nodal displacements [length] of the solution, such as ``fc.solve(model)[-1].displacement``.
     groups : sequence of str or str, optional
@@ -131,8 +133,7 @@ def error_against(
         Number of quadrature points along each direction of a cell. By default it is the order of the element plus three, so
         that the quadrature error is negligible.
     rise : ndarray (n_points,), optional
-        Temperature rise [temperature] of every point of the mesh, see `Model.temperature_rise`. Initial stresses and strains
-        of the model act with the multiplier 1.
+        Temperature rise [temperature] of every point of the mesh, see `Model.temperature_rise`.
 
     Returns
     -------
@@ -149,8 +150,8 @@ def error_against(
     >>> model = fc.Model(fc.generate.block(origin=(0.0, -1.0)), "plane_strain")
     >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
     >>> box = fc.analytic.hertz_box()
-    >>> interpolated = fc.error_against(box, model, box.displacement(model.mesh.points))
-    >>> round(interpolated.relative_energy, 2)
+    >>> norms = fc.error_against(box, model, box.displacement(model.mesh.points))
+    >>> round(norms.relative_energy, 2)
     0.21
     """
     model.refuse_nonlinear("norms of errors are")
@@ -167,20 +168,20 @@ def error_against(
         n_cells = max(1, POINTS_PER_BATCH // len(integration_rule(elements.get(name), n_points)[1]))
         for first in range(0, len(rows), n_cells):
             batch = rows[first : first + n_cells]
-            cell_arrays = _stress_in_cells(model, name, batch, u, n_points, offset)
+            cell_arrays = _cell_arrays(model, name, batch, u, n_points, offset)
             total += _squared_norms(theory, model.mesh.cells[name][batch], model.mesh.points, u, cell_arrays)
     return ErrorNorms(*np.sqrt(total).tolist())
 
 
-def _stress_in_cells(
+def _cell_arrays(
     model: Model, name: str, rows: Indices | slice, displacement: Array, n_points: int | None, offset: StressOffset | None
 ) -> CellArrays:  # fmt: skip
     """Return shape functions, stresses, volumes and compliances at the quadrature points of cells of one element type.
 
     The shape functions are (n_q, n_nodes) [-], the stresses (n_cells, n_q, n_components) [pressure], and the volumes of the
-    quadrature points (n_cells, n_q) [length^dim]. The compliances are (n_cells, n_q, n_components, n_components)
-    [1 / pressure] if they vary within cells, otherwise (n_cells, 1, n_components, n_components). `displacement` is
-    (n_points, dim) [length].
+    quadrature points (n_cells, n_q) [length^dim], in axisymmetry [length^3]. The compliances are (n_cells, n_q, n_components,
+    n_components) [1 / pressure] if they vary within cells, otherwise (n_cells, 1, n_components, n_components). `displacement`
+    is (n_points, dim) [length].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
@@ -189,20 +190,20 @@ def _stress_in_cells(
     numbers = field.moduli_rows[name][rows]
     cell_stress = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, offset)
     stress = cell_stress.at(name, xi, cells, numbers, np.arange(len(mesh.cells[name]))[rows])
-    elastic = field.compliance[numbers.reshape(len(numbers), -1)]
-    if elastic.shape[1] > 1:
-        elastic = np.einsum("nq,cqij->cnij", interpolation(name, xi), elastic)
-    return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
+    compliance = field.compliance[numbers.reshape(len(numbers), -1)]
+    if compliance.shape[1] > 1:
+        compliance = np.einsum("nq,cqij->cnij", interpolation(name, xi), compliance)
+    return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, compliance
 
 
 def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, cell_arrays: CellArrays) -> Array:
     """Return the squares (4,) of the norms over some cells, in the order of the attributes of `ErrorNorms`."""
-    N, stress, volume, elastic = cell_arrays
+    N, stress, volume, compliance = cell_arrays
     exact_u, exact_stress = _exact_fields(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
-        elastic_energy(stress - exact_stress, elastic), (error_u**2).sum(axis=-1),
-        elastic_energy(exact_stress, elastic), (exact_u**2).sum(axis=-1),
+        elastic_energy(stress - exact_stress, compliance), (error_u**2).sum(axis=-1),
+        elastic_energy(exact_stress, compliance), (exact_u**2).sum(axis=-1),
     )  # fmt: skip
     return np.array([(density * volume).sum() for density in densities])
 
@@ -292,18 +293,18 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     True
     """
     model.refuse_nonlinear("error estimates are")
-    heat, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
-    offset = model.stress_offset(heat, initial, temperature=step.temperature)
+    heat_factors, initial_factors = (step.iterations.get(f"{kind}_factors", ()) for kind in ("temperature", "initial"))
+    offset = model.stress_offset(heat_factors, initial_factors, temperature=step.temperature)
     field = model.material_field()
     in_cells = CellStress(model.mesh, model.kinematics, field.moduli, step.displacement, field.treatment, offset)
     smooth = smoothed_stress(model.mesh, field, in_cells)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
         order, u = elements.get(name).order, step.displacement
-        N, stress, volume, elastic = _stress_in_cells(model, name, slice(None), u, order + 1, offset)
+        N, stress, volume, compliance = _cell_arrays(model, name, slice(None), u, order + 1, offset)
         difference = np.einsum("qa,cai->cqi", N, smooth[name]) - stress
-        squares.append((elastic_energy(difference, elastic) * volume).sum(axis=1))
-        energy += float((elastic_energy(stress, elastic) * volume).sum())
+        squares.append((elastic_energy(difference, compliance) * volume).sum(axis=1))
+        energy += float((elastic_energy(stress, compliance) * volume).sum())
     contact = np.zeros(sum(map(len, squares)))
     for result in step.contact.values():
         _add_contact(model, result, smooth, contact)
@@ -313,7 +314,8 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:
     """Add h / E times the integral of the squared traction jump over each secondary facet to `contact` (n_solids,).
 
-    The jump is the difference between the pressure and the negative smoothed normal stress, and h is the size of the facet.
+    The jump is the difference between the pressure and the negative smoothed normal stress, h is the size of the facet, and
+    E is Young's modulus of its cell.
     """
     mesh, outer, cells_of_outer = model.mesh, outer_facets(model.mesh), cells_of_outer_facets(model.mesh)
     pair = next(pair for pair in model.contact if pair.name == result.name)

@@ -18,6 +18,9 @@ from fastcontact.results.tables import data_frame, structured
 from fastcontact.results.units import units_of_results
 from fastcontact.studies.quantities import unit
 
+if TYPE_CHECKING:
+    import pandas
+
 Rows = list[list[str]]
 
 
@@ -55,9 +58,9 @@ def align_columns(rows: Sequence[Sequence[str]]) -> list[str]:
 MARKERS = "osD^v<>ph*"
 
 
-def marker(number: int) -> str:
-    """Return the marker of the curve with a number, counted from 0."""
-    return MARKERS[number % len(MARKERS)]
+def marker(index: int) -> str:
+    """Return the marker of a curve, given its `index`, counted from 0."""
+    return MARKERS[index % len(MARKERS)]
 
 
 def panels(
@@ -72,7 +75,7 @@ def panels(
     return axes
 
 
-def message(ax: Any, text: str) -> None:
+def show_message(ax: Any, text: str) -> None:
     """Show a message in place of axes that have no data."""
     ax.set_axis_off()
     ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
@@ -187,10 +190,6 @@ def _plus_minus_signs(text: str) -> str:
     return text.replace("+-", "&plusmn;")
 
 
-if TYPE_CHECKING:
-    import pandas
-
-
 def report_fields(case: Case) -> dict[str, Any]:
     """Return the arguments of `Report` that describe a case."""
     units = units_of_results(case.units, case.model.kinematics)
@@ -206,7 +205,7 @@ class Report:
     kind : str
         Name of the kind of study.
     picture : str
-        Description of the figure.
+        Description of the figure, the alternative text of its image.
     explanations : tuple of str
         Explanations of the numbers, at the end of the report.
     name : str
@@ -241,7 +240,7 @@ class Report:
         return []
 
     def remarks(self) -> list[str]:
-        """Return warnings and the reasons of failures."""
+        """Return warnings and the reasons for failures."""
         return []
 
     def lines(self) -> list[str]:
@@ -268,14 +267,15 @@ class Report:
 
     @staticmethod
     def structured_known(columns: Mapping[str, Sequence[Any]]) -> AnyArray:
-        """Return a structured array (n_rows,) of the columns (n_rows,) that do not contain only NaN."""
+        """Return `columns` (n_rows,) as a structured array (n_rows,), without those that contain only NaN."""
         return structured({name: values for name, values in columns.items() if any(v == v for v in values)})
 
     @staticmethod
     def warnings_of(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
         """Return a line for each distinct warning of runs, given as (label, warnings).
 
-        If only some of the runs issued a warning, it begins with the labels of the first three of them.
+        If not all runs issued the warning, the line contains the labels of those that did, or the first three labels and the
+        number of the others.
         """
         issued_by, runs = dict[str, list[str]](), list(runs)
         for label, texts in runs:
@@ -312,6 +312,6 @@ class Report:
         return "".join(html_table(rows[1:], rows[0], caption) for caption, rows in captions)
 
     def framed(self, numbers: dict[str, Any]) -> dict[str, Any]:
-        """Return the numbers of a study with the name of its case and the versions of the software, as ``--json`` does."""
+        """Return the numbers of a study, the name of its case and the versions of the software, as ``--json`` writes them."""
         case = {"case": self.name, "title": self.title, "units": dict(self.units)}
         return {**case, **numbers, "versions": versions()}

@@ -14,7 +14,7 @@ import numpy as np
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.report import Report, Rows, format_axes, marker, message, number, panels, percent, to_rows
+from fastcontact.studies.report import Report, Rows, format_axes, marker, number, panels, percent, show_message, to_rows
 from fastcontact.studies.series import Point, TheoryCurve, Value
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class Drawing:
                     ax.plot(self._x(points), ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
                     n_lines += 1
         if not n_lines:
-            return message(ax, f"no theory of the {title(quantity)}")
+            return show_message(ax, f"no theory of the {title(quantity)}")
         ax.axhline(1.0, color="black", lw=0.8)
         self._format(ax, f"{title(quantity)}: ratio to theory{self._constant_note(quantity)}", "computed / theory [-]")
 

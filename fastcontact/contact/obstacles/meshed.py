@@ -37,7 +37,7 @@ class MeshedSurface:
     Parameters
     ----------
     mesh : Mesh
-        The mesh of the surface, or that of the model, in which the points of the group must not belong to solid cells.
+        A mesh that contains the surface. It may be the mesh of the model if no point of the group belongs to solid cells.
     group : str
         A group of facets.
     flip : bool
@@ -66,7 +66,8 @@ class MeshedSurface:
     group: str
     flip: bool = False
     crease: float = 30.0
-    _facets: tuple[DeformedSide, Mask] = field(init=False, repr=False)  # and whether the surface ends at each node
+    # The facets, and whether each node lies on the border of the surface.
+    _facets: tuple[DeformedSide, Mask] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.crease <= 180.0:

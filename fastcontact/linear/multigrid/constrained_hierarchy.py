@@ -22,7 +22,7 @@ from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
 from fastcontact.linear.multigrid.local_change import LocalChange, SymmetricChange, sum_of_changes
 from fastcontact.linear.multigrid.matrix import BlockMatrix
-from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, followers
+from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, follower_elimination
 from fastcontact.linear.springs import Springs
 
 # Smallest stiffening factor of a node for which the smoother and the coarser levels are corrected, see `stiffened_nodes`.
@@ -133,12 +133,12 @@ class ConstrainedHierarchy:
         """
         finest, size = self.hierarchy.levels[0], len(self.A.rows)
         finest.free_motions = FreeMotions(elimination.weights, nodes, self._inverse_blocks(nodes, spring_changes))
-        following = followers(elimination, nodes, size)
-        rounded = following.weights.astype(finest.b.dtype)
-        finest.followers = replace(following, weights=rounded, force_weights=rounded)
-        changes = [SymmetricChange.of_equations(self.A, *compose(elimination, following))]
+        followers = follower_elimination(elimination, nodes, size)
+        rounded = followers.weights.astype(finest.b.dtype)
+        finest.followers = replace(followers, weights=rounded, force_weights=rounded)
+        changes = [SymmetricChange.of_equations(self.A, *compose(elimination, followers))]
         if springs is not None:
-            changes.append(SymmetricChange.of_springs(springs.reduced(following.pivots, following.weights), size))
+            changes.append(SymmetricChange.of_springs(springs.reduced(followers.pivots, followers.weights), size))
         return changes
 
     def _inverse_blocks(self, nodes: Indices, spring_changes: list[LocalChange]) -> Array:

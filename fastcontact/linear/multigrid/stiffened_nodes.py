@@ -1,14 +1,14 @@
-"""Nodes that equations couple to a much stiffer body: corrections of the smoother and of the coarser levels.
+"""Nodes that constraint equations couple to a much stiffer body: corrections of the smoother and of the coarser levels.
 
-Equations make the unknowns of one side, the pivots, follow the unknowns of the other side: ``u = T u``. If the body of the
-pivots is much stiffer, the nodes of the other side get its stiffness. This has two consequences:
+Constraint equations make the unknowns of one side, the pivots, follow the unknowns of the other side: ``u = T u``. If the
+body of the pivots is much stiffer, the nodes of the other side get its stiffness. This has two consequences:
 
 - Motions of these nodes that move no pivot are as soft as their body, but the smoother treats them as stiff. `FreeMotions`
   corrects them with the stiffness of their body alone.
 - Motions of aggregates of these nodes and their softer neighbours would move the stiff body, and would have far too much
   energy. Therefore, coarse levels would correct neither side. In corrections from coarser levels, the roles are exchanged:
-  the unknowns of the stiffened nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow these unknowns
-  as usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`compose`).
+  the unknowns of the stiffened nodes follow the pivots, ``u = S u`` (`follower_elimination`), and the pivots then follow
+  these unknowns as usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`compose`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class FreeMotions:
     """Smoother corrections for motions of stiffened nodes that move no pivot.
 
     Let W be the weights by which the pivots depend on the stiffened nodes, and D the diagonal blocks of the stiffness
-    matrix at these nodes, without equations. The correction for a residual r is
+    matrix at these nodes before the elimination of equations. The correction for a residual r is
     ``D^-1 r - D^-1 W.T (W D^-1 W.T)^-1 W D^-1 r``, the solution of ``D u = r`` under the constraints ``W u = 0``.
 
     Parameters
@@ -65,11 +65,12 @@ class FreeMotions:
         x[self._dofs] += correction
 
 
-def followers(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
+def follower_elimination(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
     """Return the transformation S by which the unknowns of stiffened nodes follow the pivots.
 
-    Each of these unknowns satisfies the mean of its equations, weighted with its coefficients in them. The other unknowns of
-    its side are assumed to have the same displacement, so that common translations of both sides are preserved.
+    Each of these unknowns satisfies the weighted mean of the equations that contain it, with its coefficients as weights. The
+    other unknowns of its side are assumed to have the same displacement, so that common translations of both sides are
+    preserved.
 
     Parameters
     ----------
@@ -103,14 +104,14 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights)
 
 
-def compose(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:
-    """Return the product T S of the transformations, see `followers`.
+def compose(elimination: Elimination, followers: Elimination) -> tuple[Indices, csr_array]:
+    """Return the product T S of the transformations, see `follower_elimination`.
 
     Parameters
     ----------
     elimination : Elimination
         T, with m pivots.
-    following : Elimination
+    followers : Elimination
         S, for the q unknowns that follow the pivots.
 
     Returns
@@ -120,9 +121,9 @@ def compose(elimination: Elimination, following: Elimination) -> tuple[Indices, 
     weights : csr_array (m + q, n)
         Weights of all n unknowns in these values [-].
     """
-    T, S = elimination.weights, following.weights
-    T_of_followers = csr_array(T[:, following.pivots])
+    T, S = elimination.weights, followers.weights
+    T_of_followers = csr_array(T[:, followers.pivots])
     free = np.ones(T.shape[1])
-    free[following.pivots] = 0.0
-    pivots = np.concatenate([elimination.pivots, following.pivots])
+    free[followers.pivots] = 0.0
+    pivots = np.concatenate([elimination.pivots, followers.pivots])
     return pivots, csr_array(vstack([T @ diags_array(free) + T_of_followers @ S, S], format="csr"))

@@ -4,7 +4,7 @@ The nodes are the corners of the base, the apex, and the mid-side nodes of the e
 The shape functions are rational (Bedrosian, Int. J. Numer. Meth. Engng 35, 1992). They are polynomials in z, a = x / (1 - z)
 and b = y / (1 - z). At the apex, where their gradient depends on the direction, the limit along the axis is used. The conical
 product rule of 27 points integrates the gradients of the quadratic element exactly, also on curved cells, so that the patch
-test is passed. The rule of code_aster has 10 points.
+test is passed.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ PYRAMID5 = Element(
     edges=(*EDGES, (0, 4), (1, 4), (2, 4), (3, 4)), facets=((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
     shape=shape, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, xdmf=0x7, quadratic="pyramid13", dilatation=0,
 )  # fmt: skip
-# The edges of the base are parallel to x at y = -1, to y at x = 1, to x at y = 1 and to y at x = -1.
+# For each edge of the base, the coordinate that is constant along it, and whether the edge is parallel to x.
 SIDES = np.array([-1.0, 1.0, 1.0, -1.0])
 ALONG_X = np.array([True, False, True, False])
 

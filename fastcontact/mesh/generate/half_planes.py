@@ -1,4 +1,4 @@
-"""Meshes of blocks that represent half-planes and half-spaces: under an indenter, under a punch, and two crowned blocks."""
+"""Meshes of half-planes and half-spaces: a block under an indenter, a block under a punch, and two crowned blocks."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def graded_block(
     size: float | None = None,
     growth: float = 0.4,
 ) -> Mesh:
-    """Block under an indenter, the part x >= 0, in 3D also y >= 0, with its top at height 0 and a mesh refined at the origin.
+    """Block under an indenter, with its top at height 0 and a mesh that is refined at the origin.
 
-    It represents a half-plane or half-space in contact with a rigid obstacle. If its width and depth are 8 contact radii,
-    the relative error of the pressure is a few thousandths. The height is the last coordinate, y in 2D and z in 3D. Groups
-    of cells: BLOCK, TOP, CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in 3D,
-    SYMMETRY_Y (y = 0). Group of points: POLE (the origin).
+    Only the part x >= 0 is modelled, in 3D also y >= 0. It represents a half-plane or half-space in contact with a rigid
+    obstacle. If its width and depth are 8 contact radii, the relative error of the pressure is a few thousandths. The height
+    is the last coordinate, y in 2D and z in 3D. Groups of cells: BLOCK, TOP, CONTACT (the finely meshed part of the top),
+    BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in 3D, SYMMETRY_Y (y = 0). Group of points: POLE (the origin).
 
     Parameters
     ----------
@@ -51,9 +51,10 @@ def graded_block(
         Extent downward; by default `width` [length].
     contact_radius : float, optional
         Distance from the origin along x up to which edges have the length `contact_size`; by default width/10 [length].
-        Below the surface this fine region is half as deep. Choose the distance slightly larger than the contact radius.
+        Choose it slightly larger than the contact radius. The depth of this fine region is half the smaller of its extents
+        along x and y.
     contact_radius_y : float, optional
-        The corresponding distance along y in 3D; by default `contact_radius` [length].
+        The corresponding distance along y, in 3D; by default `contact_radius` [length].
     contact_size : float, optional
         Length of the edges at the contact; by default a tenth of the smaller of the two radii [length].
     size : float, optional
@@ -80,12 +81,13 @@ def graded_block(
         if dim == 2:
             refuse(element, contact_radius_y=contact_radius_y)
         radii[1] = positive("contact_radius_y", contact_radius_y, width, "width")
-    far = width / 4 if size is None else positive("size", size, width, "width")
-    near = min(min(radii) / 10, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
-    reach = max(far - near, near) / positive("growth", growth, 1.0)
+    size = width / 4 if size is None else positive("size", size, width, "width")
+    # h is the edge length at the contact, and `size` that far from it.
+    h = min(min(radii) / 10, size) if contact_size is None else positive("contact_size", contact_size, size, "size")
+    reach = max(size - h, h) / positive("growth", growth, 1.0)
 
     def coordinates(length: float, plateau: float) -> Array:
-        return graded_positions(length, Spacing(near, far, plateau=plateau, reach=plateau + reach))
+        return graded_positions(length, Spacing(h, size, plateau=plateau, reach=plateau + reach))
 
     lines = [*(coordinates(width, radius) for radius in radii), -coordinates(depth, min(*radii, 2 * depth) / 2)[::-1]]
     return _with_groups(mesh_on_lines(element, lines), lines, radii)
@@ -95,9 +97,9 @@ def _with_groups(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
     """Return the mesh with the groups of `graded_block`."""
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | (_NAMES_2D if mesh.dim == 2 else _NAMES_3D))
     # The fine region ends at the first grid line at or beyond the radius.
-    edges = np.array([x[x >= min(radius, x[-1]) * (1 - 1e-9)][0] for x, radius in zip(lines, radii)])
-    fine = edges * (1 + 1e-9)
-    mesh = with_cells_inside(mesh, "CONTACT", "TOP", lambda points: np.all(points[:, :-1] <= fine, axis=1))
+    ends = np.array([x[x >= min(radius, x[-1]) * (1 - 1e-9)][0] for x, radius in zip(lines, radii)])
+    limits = ends * (1 + 1e-9)
+    mesh = with_cells_inside(mesh, "CONTACT", "TOP", lambda points: np.all(points[:, :-1] <= limits, axis=1))
     return with_points_at(mesh, {"POLE": [0.0] * mesh.dim})
 
 
@@ -110,12 +112,12 @@ def punched_block(
     edge_size: float | None = None,
     growth: float = 1.3,
 ) -> Mesh:
-    """Block under a flat punch, the half x >= 0, with its top at y = 0 and the finest mesh at the edge of the punch.
+    """Block under a flat punch, with its top at y = 0 and the finest mesh at the edge of the punch.
 
-    A grid line passes through the edge of the punch. The block represents a half-plane or half-space. Its finite size
-    changes the results by a relative amount of about `punch_radius` / `extent`, in plane problems by twice this amount.
-    Groups of cells: BLOCK, TOP, PUNCHED (the top under the punch), BOTTOM, SIDE, SYMMETRY_X (x = 0). Groups of points:
-    POLE (the origin) and EDGE (the edge of the punch).
+    Only the half x >= 0 is modelled. A grid line passes through the edge of the punch. The block represents a half-plane or
+    half-space. Its finite size changes the results by a relative amount of about `punch_radius` / `extent`, in plane problems
+    by twice this amount. Groups of cells: BLOCK, TOP, PUNCHED (the part of the top under the punch), BOTTOM, SIDE, SYMMETRY_X
+    (x = 0). Groups of points: POLE (the origin) and EDGE (the edge of the punch).
 
     Parameters
     ----------
@@ -126,8 +128,8 @@ def punched_block(
     extent : float
         Width and depth of the block [length].
     edge_size : float, optional
-        Length of the edges at the edge of the punch and, normal to the surface, below the entire top; by default
-        punch_radius/200 [length].
+        Length of the element edges next to the edge of the punch, and of the vertical element edges along the entire top; by
+        default punch_radius/200 [length].
     growth : float
         Ratio of the lengths of adjacent edges with increasing distance from the edge of the punch, greater than 1.
 
@@ -143,14 +145,14 @@ def punched_block(
     """
     one_of("element", element, QUADRANGLES)
     radius = positive("punch_radius", punch_radius)
-    width, rate = positive("extent", extent), growth_of("growth", growth)
+    width, ratio = positive("extent", extent), growth_of("growth", growth)
     if width < 2 * radius:
         raise MeshError(f"extent = {width:g} is out of range: it must be at least 2 punch_radius = {2 * radius:g}")
     size = radius / 200 if edge_size is None else positive("edge_size", edge_size, radius, "punch_radius")
-    inward, outward = growing_positions(radius, size, rate), growing_positions(width - radius, size, rate)
+    inward, outward = growing_positions(radius, size, ratio), growing_positions(width - radius, size, ratio)
     x = np.concatenate([radius - inward[::-1], radius + outward[1:]])
     x[0], x[-1] = 0.0, width
-    mesh = mesh_on_lines(element, [x, -growing_positions(width, size, rate)[::-1]])
+    mesh = mesh_on_lines(element, [x, -growing_positions(width, size, ratio)[::-1]])
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | _NAMES_2D)
     mesh = with_cells_inside(mesh, "PUNCHED", "TOP", lambda points: points[:, 0] <= radius)
     return with_points_at(mesh, {"POLE": (0.0, 0.0), "EDGE": (radius, 0.0)})
@@ -201,23 +203,23 @@ def crowned_blocks(
     False
     """
     one_of("element", element, QUADRANGLES)
-    R, width, rate = positive("R", R), positive("extent", extent), growth_of("growth", growth)
+    R, width, ratio = positive("R", R), positive("extent", extent), growth_of("growth", growth)
     if width > R:
         raise MeshError(f"extent = {width:g} is out of range: it must be at most R = {R:g}")
-    fine = positive("contact_radius", contact_radius, width / 2, "extent/2")
-    size = positive("contact_size", contact_size, fine, "contact_radius")
-    right, down = _positions(size, fine, width, rate), _positions(size, size, width, rate)
+    radius = positive("contact_radius", contact_radius, width / 2, "extent/2")
+    size = positive("contact_size", contact_size, radius, "contact_radius")
+    right, down = _positions(size, radius, width, ratio), _positions(size, size, width, ratio)
     lattice = mesh_on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
     x, y = lattice.points.T
     crown = x**2 / (2 * R) * (1 + y / width)  # the displacement of the nodes decays downward
     lower = renamed(lattice.replace(points=np.column_stack([x, y - crown])), _NAMES_CROWNED.get)
-    lower = with_cells_inside(lower, "CONT_LOWER", "CONT_LOWER", lambda points: np.abs(points[:, 0]) <= 1.2 * fine)
+    lower = with_cells_inside(lower, "CONT_LOWER", "CONT_LOWER", lambda points: np.abs(points[:, 0]) <= 1.2 * radius)
     lower = with_points_at(lower, {"POLE_LOWER": (0.0, 0.0)})
     upper = mirrored(lower, "y", rename=lambda name: name.replace("LOWER", "UPPER"))
     return union(lower, upper)
 
 
-def _positions(size: float, fine: float, length: float, growth: float) -> Array:
-    """Return positions (n + 1,) from 0 to `length`, at distances of about `size` up to `fine` that grow beyond [length]."""
-    equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
-    return np.concatenate([equal, fine + growing_positions(length - fine, size * growth, growth)[1:]])
+def _positions(size: float, radius: float, length: float, growth: float) -> Array:
+    """Return positions (n + 1,) from 0 to `length`, with a spacing of about `size` up to `radius`, then growing [length]."""
+    equal = np.linspace(0.0, radius, segments(round(radius / size)) + 1)
+    return np.concatenate([equal, radius + growing_positions(length - radius, size * growth, growth)[1:]])

@@ -119,7 +119,7 @@ def lay_out(axes: Any, zoom: float | None = None) -> Any:
 
     By default the box with its labels fills the axes.
     """
-    axes.set_box_aspect(_box_size(axes), zoom=zoom_to_axes(axes) if zoom is None else zoom)
+    axes.set_box_aspect(_box_size(axes), zoom=filling_zoom(axes) if zoom is None else zoom)
     axes.figure.draw_without_rendering()
     return axes
 
@@ -129,7 +129,7 @@ def _box_size(axes: Any) -> Array:
     return np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
 
 
-def zoom_to_axes(axes: Any) -> float:
+def filling_zoom(axes: Any) -> float:
     """Return the factor [-] by which the box of 3D axes with its labels can be enlarged until it fills the axes."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
@@ -147,7 +147,7 @@ def zoom_to_axes(axes: Any) -> float:
 LETTER_WIDTH = 0.09
 
 
-def size_around(points: Array, smallest_height: float = 3.2) -> tuple[float, float]:
+def figure_size(points: Array, smallest_height: float = 3.2) -> tuple[float, float]:
     """Return the width and the height of a figure for a body, with space for a colour bar, labels and a title [inch].
 
     `points` (n, 2) are those of the body [length], and `smallest_height` is a lower bound on the height [inch].
@@ -174,7 +174,7 @@ def label_axes(
     caption, shrink, legend_y = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
     if points is not None:
         width, height = np.ptp(points, axis=0)
-        caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER_WIDTH))
+        caption = textwrap.fill(caption, int(figure_size(points)[1] / LETTER_WIDTH))
         shrink = float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))  # shorter for flat bodies
         half_inch_below = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
         legend_y = half_inch_below if alone else -0.09

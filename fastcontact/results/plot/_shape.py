@@ -144,7 +144,7 @@ def deformed_shape(
     images = [points, points * [-1.0, 1.0]] if mirrored else [points]
     extent = np.concatenate(images)
     extent = extent if zoom is None else np.array(_axes.zoom_window(points[plot_field.extreme], zoom, extent))
-    axes = new_axes(ax, _axes.size_around(extent))
+    axes = new_axes(ax, _axes.figure_size(extent))
     for image in images:
         artist = _draw(axes, plot_field, image, edges, limits or plot_field.range, extent)
     if zoom is not None:
@@ -263,7 +263,7 @@ def section(
     best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     points = flat.reshape(-1, 2)
     points = points if zoom is None else np.array(_axes.zoom_window(flat[best], zoom, points))
-    axes = new_axes(ax, _axes.size_around(points))
+    axes = new_axes(ax, _axes.figure_size(points))
     limits = plot_field.range if plot_field.signed else (float(values.min()), float(values.max()))
     corner_rows = np.arange(values.size).reshape(-1, 3)
     artist = fill_triangles(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), plot_field.colours, limits)
@@ -513,7 +513,7 @@ def animate(
     target, scale = checked_target(path), scale_of(scale, mesh, steps)
     projection, size = None if mesh.dim == 2 else "3d", (6.4, 6.0)
     if mesh.dim == 2:
-        size = _axes.size_around(mesh.points * [2.0 if mirrored else 1.0, 1.0], 3.8)
+        size = _axes.figure_size(mesh.points * [2.0 if mirrored else 1.0, 1.0], 3.8)
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
     limits, box = _limits_of_steps(mesh, steps, field, scale, mirrored)
@@ -529,7 +529,7 @@ def animate(
             )  # fmt: skip
             if mesh.dim == 3:
                 show_box(axes, *box, view)
-                zoom = zoom or _axes.zoom_to_axes(axes)
+                zoom = zoom or _axes.filling_zoom(axes)
                 _axes.lay_out(axes, zoom)
             else:
                 axes.set(**{f"{axis}lim": ends for axis, *ends in zip("xy", *box, strict=True)})

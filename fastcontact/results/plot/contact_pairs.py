@@ -10,7 +10,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import LETTER_WIDTH, Axes, lay_out, new_axes, size_around
+from fastcontact.results.plot._axes import LETTER_WIDTH, Axes, figure_size, lay_out, new_axes
 from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
 from fastcontact.results.units import axis_label
@@ -43,7 +43,7 @@ def contacts(
     >>> ax = fc.plot.contacts(fc.find_contacts(fc.generate.block_on_block()))
     """
     mesh = found_contacts.mesh
-    width, height = size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
+    width, height = figure_size(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
     if mesh.dim == 2:  # the legend is beside the axes
         margin = LETTER_WIDTH * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
         width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + margin)

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import csr_array
 
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, followers
+from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, follower_elimination
 
 SIZE, PIVOTS, OPPOSITE, FREE = 3, 12, 25, 10
 N = (PIVOTS + OPPOSITE + FREE) * SIZE
@@ -66,11 +66,11 @@ def test_free_motions_move_no_pivot_and_yield_as_their_body_does(directions):
 def test_both_sides_translate_together_where_stiffened_nodes_follow(directions, tilt):
     rng = np.random.default_rng(5)
     elimination = equations(directions, tilt, rng)
-    following = followers(elimination, NODES, SIZE)
-    assert set(following.pivots % SIZE) == set(directions)
-    assert len(following.pivots) > 0.7 * OPPOSITE * len(directions)
-    pivots, weights = compose(elimination, following)
-    both = matrix(elimination.pivots, elimination.weights) @ matrix(following.pivots, following.weights)
+    followers = follower_elimination(elimination, NODES, SIZE)
+    assert set(followers.pivots % SIZE) == set(directions)
+    assert len(followers.pivots) > 0.7 * OPPOSITE * len(directions)
+    pivots, weights = compose(elimination, followers)
+    both = matrix(elimination.pivots, elimination.weights) @ matrix(followers.pivots, followers.weights)
     assert np.allclose(matrix(pivots, weights), both)
     # The pivots' side decides: where it moves and the other lies still, that follows.
     u = np.zeros((N // SIZE, SIZE))
@@ -78,7 +78,7 @@ def test_both_sides_translate_together_where_stiffened_nodes_follow(directions, 
     if tilt == 0.0:
         moved = (both @ u.ravel()).reshape(-1, SIZE)
         assert np.allclose(
-            moved[following.pivots // SIZE, following.pivots % SIZE], np.r_[1.0, -2.0, 3.0][following.pivots % SIZE]
+            moved[followers.pivots // SIZE, followers.pivots % SIZE], np.r_[1.0, -2.0, 3.0][followers.pivots % SIZE]
         )
     u[NODES] = 1.0, -2.0, 3.0
     assert np.allclose(both @ u.ravel(), u.ravel())
@@ -90,5 +90,5 @@ def test_unknowns_that_move_no_pivot_by_themselves_do_not_follow():
     W = elimination.weights.toarray()
     W[:, NODES[0] * SIZE + 2] = -0.1
     W = csr_array(W)
-    following = followers(Elimination(elimination.pivots, W, elimination.offset, W), NODES, SIZE)
-    assert NODES[0] * SIZE + 2 not in following.pivots
+    followers = follower_elimination(Elimination(elimination.pivots, W, elimination.offset, W), NODES, SIZE)
+    assert NODES[0] * SIZE + 2 not in followers.pivots
