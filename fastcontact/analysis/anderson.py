@@ -35,18 +35,18 @@ class Anderson:
     where: Indices
     all_mixed: bool = True
     # Residuals and images of the last iterates.
-    _iterates: list[tuple[Array, Array]] = field(default_factory=list, init=False)
+    _history: list[tuple[Array, Array]] = field(default_factory=list, init=False)
 
     def restart(self) -> None:
         """Discard the earlier iterates, because G has changed."""
-        self._iterates.clear()
+        self._history.clear()
 
     def mixed(self, x: Array, image: Array) -> Array:
         """Return the next iterate (n,), given the last iterate `x` (n,) and its `image` G(x) (n,)."""
         mixed_components = slice(None) if self.all_mixed else self.where
-        self._iterates.append(((image - x)[self.where], image[mixed_components]))
-        del self._iterates[: -self.depth - 1]
-        *earlier, (residual, last_image) = self._iterates
+        self._history.append(((image - x)[self.where], image[mixed_components]))
+        del self._history[: -self.depth - 1]
+        *earlier, (residual, last_image) = self._history
         if not earlier:
             return image
         differences = np.column_stack([residual - earlier_residual for earlier_residual, _ in earlier])

@@ -163,4 +163,4 @@ def ratio_to_elastic_waves(pair: Formulation, worn: Worn) -> float:
     pressures change sign in each step and decrease more slowly. For pressures at integration points, the stiffness is up to
     twice as large, so that the ratio is the product itself.
     """
-    return worn.largest_rate * np.pi * pair.modulus / (2.0 * pair.shortest_edge)
+    return worn.largest_rate * np.pi * pair.modulus / (2.0 * pair.smallest_node_spacing)

@@ -57,8 +57,8 @@ class ContactSides:
     excluded: Mask = field(init=False, repr=False)
     # Whether the constraints need tangents, for friction, tying or a cohesive layer; adhesion needs none.
     has_tangents: bool = field(init=False, repr=False)
-    # Whether gaps are linearised at the mean of the displacements of the pairing and of its solution, which reduces the error
-    # of a Newton step. Otherwise, they are linearised at the displacements of the pairing.
+    # Whether gaps are linearised at the mean of the displacements at which the sides were paired and those of the subsequent
+    # solution, which reduces the error of a Newton step. Otherwise, they are linearised at the former.
     linearised_at_mean: bool = field(init=False, default=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -74,7 +74,7 @@ class ContactSides:
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
         if self.surface_smoothing and not isinstance(self.primary, Surface):
-            raise ContactError("surface_smoothing needs two meshed sides: leave it out at an obstacle")
+            raise ContactError("surface_smoothing needs two meshed sides: omit it for an obstacle")
         if self.friction:
             secondary, primary = self.secondary, self.primary
             self.secondary = reflected(secondary, self.held_motions, self.points, primary.points)
@@ -105,14 +105,14 @@ class ContactSides:
         return Candidates.from_side(self.secondary)
 
     @cached_property
-    def shortest_edge(self) -> float:
+    def smallest_node_spacing(self) -> float:
         """Smallest diameter of the facets, divided by the order of their shape functions [length]."""
         blocks = self.secondary.blocks
         return float(min(b.diameters(self.points).min() / elements.get(b.element).order for b in blocks))
 
     @cached_property
     def held_nodes(self) -> Indices:
-        """The secondary nodes that supports hold, numbered on the side."""
+        """The secondary nodes that supports hold, numbered within the side."""
         held = () if self.held_motions is None else self.held_motions.nodes
         return np.flatnonzero(np.isin(self.secondary.points, held))
 
@@ -151,11 +151,11 @@ class ContactSides:
     ) -> Array:
         """Return the part (k, n) of the slips of candidates in the load step that does not depend on displacements [length].
 
-        It is minus the motion of a rigid primary side in the step. Between two bodies, if `slip` is ``"symmetric"``, it is
-        minus the tangential displacement that closes the gap. On curved surfaces, in particular at the edge of the contact,
-        the normal of the primary side is inclined to the direction in which the gap closes. A component of this motion would
-        then count as slip. The gap is assumed to close along the mean of the normals of both sides, which is exact for two
-        bodies that are mirror images. `directions` are k unit tangents (n, dim).
+        It is the negative of the motion of a rigid primary side in the step. Between two bodies, if `slip` is
+        ``"symmetric"``, it is the negative of the tangential displacement that closes the gap. On curved surfaces, in
+        particular at the edge of the contact, the normal of the primary side is inclined to the direction in which the gap
+        closes. A component of this motion would then count as slip. The gap is assumed to close along the mean of the normals
+        of both sides, which is exact for two bodies that are mirror images. `directions` are k unit tangents (n, dim).
         """
         if isinstance(self.primary, RigidSide):
             obstacle_motion = self.rigid_motion(candidates.positions, config)
@@ -196,7 +196,7 @@ class ContactSides:
     ) -> Array:
         """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length].
 
-        The candidates belong to facets.
+        The candidates must have facets and reference coordinates.
         """
         assert candidates.facet is not None
         assert candidates.xi is not None
@@ -243,7 +243,7 @@ class ContactSides:
     def nodal_gap(
         self, config: Configuration, with_clearance: bool = True, displacement: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return the gaps of the secondary nodes, and the opposite normals.
+        """Return the gaps of the secondary nodes, and the normals of the primary side opposite these nodes.
 
         Parameters
         ----------

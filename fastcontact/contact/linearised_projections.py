@@ -29,11 +29,11 @@ class InterpolatedNormals:
     ----------
     side : DeformedSide
     local : ndarray of int (n, k)
-        Nodes of the facet of each point, numbered on the side.
+        Nodes of the facet of each point, numbered within the side.
     shape : ndarray (n, k)
         Values of their shape functions at the point [-].
     at_nodes : ndarray (n, k, dim), optional
-        Normals at these nodes, which differ from `DeformedSide.nodal_normals` at corners [-].
+        Normals at these nodes, which differ from `DeformedSide.nodal_normals` at corners of the surface [-].
 
     Attributes
     ----------
@@ -77,8 +77,8 @@ class Variation(NamedTuple):
         Variation of the matrix `motion` (n, n_points) of the points, given by the weights of k nodes in each row [-]. The
         nodes are in ascending order. Products with these arrays take less time than the construction of a `csr_array`.
     foot : ndarray (n, dim)
-        Variation of the positions of these primary points, on the smooth surface if there is one, due to that of xi, with
-        fixed facets [length].
+        Variation of the positions of these primary points, on the smooth surface if there is one, that is caused by the
+        variation of xi alone, with the facets fixed [length].
     normal : ndarray (n, dim)
         Variation of the normals [-].
     """
@@ -105,7 +105,7 @@ class Variation(NamedTuple):
 class _SurfacePoints:
     """Secondary points paired with a meshed side, and the variation of their projections and normals.
 
-    The facing point of a secondary point is the primary point that it faces.
+    The foot of a secondary point is the primary point that it faces.
 
     Parameters
     ----------
@@ -128,13 +128,13 @@ class _SurfacePoints:
     Attributes
     ----------
     motion : csr_array (n, n_points)
-        Map from nodal vectors to the differences of their values at the points and at the facing points [-].
+        Map from nodal vectors to the differences of their values at the points and at their feet [-].
     offset : ndarray (n, dim)
-        Vectors from the facing points to the points [length].
+        Vectors from the feet to the points [length].
     axes : ndarray (n, dim - 1, dim)
-        Tangent vectors of the primary facets at the facing points [length].
+        Tangent vectors of the primary facets at the feet [length].
     normal : ndarray (n, dim)
-        Normals of the primary side at the facing points [-].
+        Normals of the primary side at the feet [-].
     averaged : InterpolatedNormals or None
         Averaged normals; None with other normals.
     """
@@ -147,7 +147,7 @@ class _SurfacePoints:
         nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
         self.motion = shapes_at(shape, nodes, len(coordinates))
         self._feet, ascending = feet, np.argsort(feet.nodes, axis=1)
-        self._facing_nodes = np.take_along_axis(feet.nodes, ascending, axis=1)
+        self._foot_nodes = np.take_along_axis(feet.nodes, ascending, axis=1)
         self._weight_gradient = -np.take_along_axis(feet.gradient, ascending[:, :, None], axis=1)
         self.axes = np.swapaxes(feet.gradient, 1, 2) @ coordinates[feet.nodes]
         self.offset = self.motion @ coordinates
@@ -165,7 +165,7 @@ class _SurfacePoints:
         else:
             self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
         # Let a_i be the tangent vectors, n the direction of the projection, g the distance along n, and dv the variation of
-        # the displacements of the points relative to the facing points. Then ``a_i dxi_i + g dn = dv`` up to a multiple of n.
+        # the displacements of the points relative to their feet. Then ``a_i dxi_i + g dn = dv`` up to a multiple of n.
         # The products with the tangents perpendicular to n eliminate this multiple.
         direction, gradient = self.normal, self._normal_gradient
         if closest:
@@ -210,7 +210,7 @@ class _SurfacePoints:
         foot = np.einsum("nid,ni->nd", self._foot_gradient, xi)
         weights = np.einsum("nki,ni->nk", self._weight_gradient, xi)
         return Variation(
-            xi, weights, self._facing_nodes, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi)
+            xi, weights, self._foot_nodes, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi)
         )
 
     def stiffness(self, force: Array) -> csr_array:
@@ -251,7 +251,7 @@ class _ObstaclePoints:
         Values of the shape functions at the points, by node [-].
     obstacle : RigidSide
     coordinates : ndarray (n_points, dim)
-        Coordinates of the pairing [length].
+        Nodal coordinates in the configuration of the pairing [length].
     pose : Pose
     """
 

@@ -26,8 +26,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 def nodes_with_prescribed_gap(sides: ContactSides, config: Configuration) -> Mask:
     """Return the nodes (n_nodes,) at which supports and multi-point constraints prescribe the gap.
 
-    The contact forces of such nodes act between supports. On non-matching meshes, their gaps may depend on displacements
-    of other primary nodes, but not on those of secondary nodes, and the constraints are nearly redundant.
+    The contact forces of such nodes act between supports. On non-matching meshes, their gaps may also depend on unrestrained
+    primary nodes, but not on secondary nodes, and the constraints are nearly redundant.
     """
     motions, points = sides.held_motions, sides.secondary.points
     prescribed = np.zeros(len(points), bool)
@@ -37,7 +37,7 @@ def nodes_with_prescribed_gap(sides: ContactSides, config: Configuration) -> Mas
     if len(nodes):
         candidates, pairing = _paired_nodes(sides, nodes, config)
         rows = rows_of(relative_motion(candidates, pairing, len(sides.points)), pairing.normal)
-        # The gap is prescribed if the free unknowns carry less than half of the length of its row.
+        # The gap is prescribed if the part of its row for the free unknowns has less than half of the norm of the row.
         square, free_square = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ motions.motion))
         prescribed[nodes] = pairing.paired & (free_square < 0.25 * square)
     return prescribed & ~sides.excluded[points]
@@ -48,7 +48,7 @@ def nodes_with_undetermined_traction(sides: ContactSides, config: Configuration)
 
     This is the case if supports hold all nodes of a facet, and the other side, in one direction. If supports hold the
     complete side in a tangential direction, as in a slice in plane strain, the traction in this direction vanishes and is
-    not undetermined. The gap determines the pressure of a penalty, and the traction of a cohesive layer.
+    not undetermined. With a penalty, the gap determines the pressure, and with a cohesive layer the traction.
     """
     held_both = held_on_both_sides(sides, config)
     if not held_both.any() or sides.options.cohesion is not None:
@@ -127,7 +127,7 @@ def _held_without_motion(sides: ContactSides, config: Configuration) -> Array:
 
 
 def _paired_nodes(sides: ContactSides, nodes: Indices, config: Configuration) -> tuple[Candidates, Pairing]:
-    """Return secondary `nodes` (n,), numbered on the side, as candidates, and their pairing."""
+    """Return secondary `nodes` (n,), numbered within the side, as candidates, and their pairing."""
     candidates = Candidates.from_nodes(sides.secondary.points[nodes])
     return candidates, sides.pair_candidates(candidates, config, max(sides.projection_tolerance or 0.0, SMALL_OVERHANG))
 

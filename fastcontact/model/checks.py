@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
-    """Raise ModelError with the names of bodies and motions if there are any rigid-body motions."""
+    """Raise ModelError with the names of bodies and motions if any rigid-body motion is unrestrained."""
     if not len(motions):
         return
     total, hinges = len(motions), ""
@@ -32,20 +32,23 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
             f"{node_at(mesh, motions.hinges[0])}): merge whole facets, or leave the parts separate and define the contact"
         )
     raise ModelError(
-        f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {grouped_by_body(motions.names())}. "
+        f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not restrained: {grouped_by_body(motions.names())}. "
         "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"
         f"{hinges}"
     )
 
 
-def check_ramps(named_tables: Iterable[tuple[str, Table | None]], instants: Iterable[float]) -> None:
-    """Raise ModelError if one of the tables (name, table) of loads, supports and constraints does not cover the instants."""
-    instants = list(instants)
+def check_ramps(named_tables: Iterable[tuple[str, Table | None]], load_factors: Iterable[float]) -> None:
+    """Raise ModelError if one of the tables (name, table) of loads, supports and constraints does not cover the steps.
+
+    The steps end at the `load_factors`.
+    """
+    load_factors = list(load_factors)
     for name, table in named_tables:
-        outside = [t for t in instants if table is not None and not table[0][0] <= t <= table[-1][0]]
+        outside = [t for t in load_factors if table is not None and not table[0][0] <= t <= table[-1][0]]
         if outside and table is not None:
             raise ModelError(
-                f"the ramp of {name} covers {table[0][0]:g} to {table[-1][0]:g}, but the analysis has the instant "
+                f"the ramp of {name} covers {table[0][0]:g} to {table[-1][0]:g}, but a load step ends at "
                 f"{outside[0]:g}: extend the table"
             )
 

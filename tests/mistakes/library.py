@@ -183,11 +183,11 @@ MESH = [
     Mistake("nodes that were not merged", lambda: solved(cracked()), fc.FastcontactWarning,
             r"3 nodes coincide with another node, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact"),
     Mistake("nodes not merged, one part not held", lambda: solved(square_in_two()), fc.ModelError,
-            r"3 rigid-body motions are not supported: body 'B': translation along x, .*rotation"),
+            r"3 rigid-body motions are not restrained: body 'B': translation along x, .*rotation"),
     Mistake("a fine mesh merged with a coarse one", lambda: solved(torn()), fc.FastcontactWarning,
             r"2 nodes lie on facets of their own body that they do not belong to \(first: point \d+ at \(0\.25, 1\), on the facet around \(0\.25, 1\)\): the body is torn there\. Let cells share whole facets, or leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact"),
     Mistake("bodies connected at a single node", lambda: solved(hanging_together()), fc.ModelError,
-            r"1 rigid-body motion is not supported: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that is connected at point \d+ at \(1, 1\): rotation about \(1, 1\)\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies are connected only at nodes \(number: 1, first: point \d+ at \(1, 1\)\): merge whole facets, or leave the parts separate and define the contact"),
+            r"1 rigid-body motion is not restrained: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that is connected at point \d+ at \(1, 1\): rotation about \(1, 1\)\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies are connected only at nodes \(number: 1, first: point \d+ at \(1, 1\)\): merge whole facets, or leave the parts separate and define the contact"),
     Mistake("a support on a node without cells", lambda: solved(with_orphan()), fc.ModelError,
             r"the displacement x prescribed on 'LONE' contains only points that belong to no solid cell \(number: 1, first: point 73\): name a group of the body, or connect the points to it with add_coupling or relate"),
     Mistake("a cell with an angle near 180 degrees", lambda: solved(flat_cell()), fc.FastcontactWarning,
@@ -288,11 +288,11 @@ def stretched(length):
 # fmt: off
 SUPPORTS = [
     Mistake("no support at all", lambda: solved(blocks(supports=False)), fc.ModelError,
-            r"4 rigid-body motions are not supported: body 'LOWER': translation along x, translation along y, rotation about \(5, -2\.5\); body 'UPPER': translation along y, rotation about \(5, 2\.5\), translation along x\. "),
+            r"4 rigid-body motions are not restrained: body 'LOWER': translation along x, translation along y, rotation about \(5, -2\.5\); body 'UPPER': translation along y, rotation about \(5, 2\.5\), translation along x\. "),
     Mistake("one body free to slide", lambda: solved(sliding()), fc.ModelError,
-            r"1 rigid-body motion is not supported: body 'UPPER': translation along x\. Fix or prescribe a displacement component that stops each"),
+            r"1 rigid-body motion is not restrained: body 'UPPER': translation along x\. Fix or prescribe a displacement component that stops each"),
     Mistake("a plate supported at one point", lambda: solved(square(BOTTOM_LEFT="xy")), fc.ModelError,
-            r"1 rigid-body motion is not supported: body 'BLOCK': .*rotation"),
+            r"1 rigid-body motion is not restrained: body 'BLOCK': .*rotation"),
     Mistake("supports that contradict each other", lambda: solved(contradicting()), fc.ModelError,
             r"'UPPER_TOP' prescribes y = 0\.5 at point \d+, but 'UPPER_TOP' prescribes -0\.01 there: remove one of the two"),
     Mistake("a support without a component", lambda: blocks().fix("LOWER_LEFT", ""), fc.ModelError,
@@ -490,7 +490,7 @@ RAMP = [
     Mistake("a table with NaN", lambda: fc.Ramp((1.0,), ((0.0, 0.0), (1.0, np.nan))), fc.ModelError,
             r"the table of the ramp contains a number that is not finite"),
     Mistake("a history shorter than the analysis", lambda: solved(short_history()), fc.ModelError,
-            r"the ramp of the displacement x prescribed on 'LOWER_LEFT' covers 0 to 0\.5, but the analysis has the instant 1: extend the table"),
+            r"the ramp of the displacement x prescribed on 'LOWER_LEFT' covers 0 to 0\.5, but a load step ends at 1: extend the table"),
 ]
 # fmt: on
 

@@ -145,7 +145,7 @@ def test_units_do_not_matter(length, pressure):
             fc.ConvergenceError,
             r"obstacle 'ball': translation along y",
         ),
-        ({"force": {"y": 0.0}}, fc.ModelError, r"not supported: obstacle 'ball': translation along y"),
+        ({"force": {"y": 0.0}}, fc.ModelError, r"not restrained: obstacle 'ball': translation along y"),
         ({"force": {"y": float("nan")}}, fc.ModelError, r"force y on obstacle 'ball'"),
         ({"force": {"z": -9.0}}, fc.ModelError, r"the force on obstacle 'ball'"),
     ],

@@ -58,7 +58,7 @@ def test_a_body_that_a_watched_pair_alone_would_hold_is_refused():
     model = touching(held(blocks()), "node_to_segment", kind="gap_only")
     model.supports = [support for support in model.supports if support.group != "UPPER_TOP"]
     model.add_pressure("UPPER_TOP", 1.0)
-    refused(fc.ModelError, "not supported", fc.solve, model, fc.linear_ramp(1))
+    refused(fc.ModelError, "not restrained", fc.solve, model, fc.linear_ramp(1))
 
 
 # How far a point looks

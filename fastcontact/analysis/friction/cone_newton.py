@@ -3,7 +3,7 @@ r"""Unilateral contact and Coulomb's law as a nonsmooth complementarity function
 This is the common part of the solvers `dense` and `eliminated`.
 
 The unknowns of a constraint are its normal force n and its k tangential forces t. Its gap g and its slips s along the k
-tangents belong to these forces. All values are scaled such that the compliance of each constraint is near one. Forces, gaps
+tangents result from these forces. All values are scaled such that the compliance of each constraint is near one. Forces, gaps
 and slips then have the same unit, and ``n - g`` is meaningful. The solution is the zero of
 
 .. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection onto the disc of radius } \mu [n - g]_+
@@ -81,14 +81,14 @@ class Law:
         n, _, norm, radius = self.trial(y, gaps)
         return (n > 0) | self.equality, (n > 0) & (norm <= radius) & (self.mu > 0)
 
-    def slide(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
+    def sliding_directions(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
         """Return the directions d of t - s and their influence on t, at the constraints numbered `sliding` (q,).
 
         Returns
         -------
         d : ndarray (k, q)
             Unit vectors.
-        turning : ndarray (q,)
+        radius_ratio : ndarray (q,)
             Derivative of t with respect to the component of t - s perpendicular to d: the radius of the friction disc over
             the norm of t - s, at most 1.
         """
@@ -105,8 +105,8 @@ class Law:
         components, slipping = np.arange(len(y)), np.flatnonzero(~sticking[rows])
         E, D = np.zeros((2, len(y), len(y), len(rows)))
         D[components, components] = 1.0
-        d, turning = self.slide(y, gaps, rows[slipping])
-        projection = turning * (np.eye(len(d))[:, :, None] - d[:, None] * d)
+        d, radius_ratio = self.sliding_directions(y, gaps, rows[slipping])
+        projection = radius_ratio * (np.eye(len(d))[:, :, None] - d[:, None] * d)
         D[1:, 1:, slipping] = projection
         E[1:, 1:, slipping] = np.eye(len(d))[:, :, None] - projection
         E[1:, 0, slipping] = -self.mu[rows[slipping]] * d
@@ -144,7 +144,7 @@ def newton(
     ----------
     problem : Linearised
     y, gaps : ndarray (1 + k, m)
-        Initial forces, and the gaps and slips that belong to them.
+        Initial forces, and the gaps and slips that result from them.
     tolerance : float
         Tolerance of the residual, relative to the largest force [-].
     max_iterations : int, optional
@@ -160,16 +160,16 @@ def newton(
     norm = float(np.linalg.norm(residual))
     best = y, gaps, np.inf
     for iteration in range(max_iterations + 1):
-        largest = float(np.abs(y).max())
-        largest_residual = float(np.abs(residual).max())
-        relative = largest_residual / largest if largest else float(largest_residual > problem.round_off)
-        if relative < best[2]:
-            best = y, gaps, relative
-        settled = iteration >= min_iterations and largest_residual <= tolerance * largest + problem.round_off
+        max_force = float(np.abs(y).max())
+        max_residual = float(np.abs(residual).max())
+        relative_residual = max_residual / max_force if max_force else float(max_residual > problem.round_off)
+        if relative_residual < best[2]:
+            best = y, gaps, relative_residual
+        settled = iteration >= min_iterations and max_residual <= tolerance * max_force + problem.round_off
         if settled or iteration == max_iterations:
             break
-        trial, trial_gaps = problem.step(y, gaps, *law.state(y, gaps))
-        step, change = trial - y, trial_gaps - gaps
+        full_y, full_gaps = problem.step(y, gaps, *law.state(y, gaps))
+        step, change = full_y - y, full_gaps - gaps
         damping = 1.0
         while (
             line_search
@@ -180,12 +180,12 @@ def newton(
             if damping < 0.5**HALVINGS:  # at a kink no step may decrease the residual: take the full step
                 damping = 1.0
                 break
-        y, gaps = (trial, trial_gaps) if damping == 1.0 else (y + damping * step, gaps + damping * change)
+        y, gaps = (full_y, full_gaps) if damping == 1.0 else (y + damping * step, gaps + damping * change)
         residual = law.residual(y, gaps)
         norm = float(np.linalg.norm(residual))
     if not settled:
-        y, gaps, relative = best
-    return FrictionSolution(y, gaps, *law.state(y, gaps), settled, relative, iteration)
+        y, gaps, relative_residual = best
+    return FrictionSolution(y, gaps, *law.state(y, gaps), settled, relative_residual, iteration)
 
 
 # Compliance of a prescribed slip relative to the compliance of its gap. It is negligible, but with it the equation of stick

@@ -214,13 +214,13 @@ class Eliminated:
 
     def _sliding(self, y: Array, gaps: Array, at: Indices) -> _Sliding:
         """Return the friction terms of the sliding constraints numbered `at` (q,), linearised at `y` and `gaps`."""
-        d, turning = self.law.slide(y, gaps, at)
+        d, radius_ratio = self.law.sliding_directions(y, gaps, at)
         ratios = self.law.mu[at] * d
         if len(d) == 1:
             return _Sliding(at, ratios)
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
-        spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
+        spring = np.minimum(radius_ratio / np.maximum(1.0 - radius_ratio, TINY), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._compliance[1, at])  # in series with the compliance of the constraint
         free = (across * self._free[1:, at]).sum(axis=0)
         return _Sliding(at, ratios, Springs(csr_array(rows), spring), across, free)

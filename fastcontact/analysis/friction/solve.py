@@ -3,10 +3,10 @@
 The unknowns are the normal forces n >= 0 and the tangential forces t of all constraints. The gaps g and the slips s of the
 load step are ``(g, s) = free + F (n, t)``, where `free` are their values without contact forces. The Delassus operator is
 ``F = R K^-1 R.T + C``, where K is the stiffness matrix, R contains the derivatives of gaps and slips with respect to the
-displacements, and C is the compliance of the constraints themselves. `dense` solves this problem without regularisation,
-unless slips are linearly dependent: the slip of a sticking constraint is zero, and the force of a sliding constraint lies on
-the friction cone. If the linear solver can eliminate constraints, `eliminated` is tried first. It solves the same problem
-without forming F.
+displacements, and C is the compliance of the constraints themselves. `dense` solves this problem: the slip of a
+sticking constraint is zero, and the force of a sliding constraint lies on the friction cone. The problem is regularised only
+if slips are linearly dependent. If the linear solver can eliminate constraints, `eliminated` is tried first. It solves the
+same problem without forming F.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ def solve(
 ) -> Solution:  # fmt: skip
     """Return the displacements and the contact forces that satisfy unilateral contact and Coulomb's law.
 
-    Each constraint in F costs columns of the inverse stiffness matrix. The problem therefore begins with the constraints that
-    were closed, and adds others if they penetrate. Constraints that are never added are open and free of forces, so that the
-    result is that of the complete problem.
+    Each constraint in F costs columns of the inverse stiffness matrix. The solution therefore starts with the constraints
+    that were closed, and others are added if they penetrate. Constraints that are never added are open and free of forces,
+    so that the result is that of the complete problem.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def solve(
         solution = _eliminated(loaded, constraints, closed, accuracy, u, forces, path)
         if solution is not None:
             return solution
-        log.info("friction: the iteration on eliminated constraints did not converge, their compliance is formed")
+        log.info("friction: the iteration on eliminated constraints did not converge; the compliance is formed instead")
     usable, iterations = constraints.usable, 0
     initial = closed | constraints.equality | (False if path is None else ~path.waiting)
     included = usable & initial
@@ -115,8 +115,8 @@ def _eliminated(
             result = solve_eliminated(constraints, closed, forces)
         else:
             y, closing = path.along(constraints.directions, all_rows)
-            end = loaded.full_solution(constraints.force(y[0], y[1:].T))
-            lag = -constraints.gaps_at_rest() - np.stack([R @ end for R in (constraints.B, *constraints.tangents)])
+            u_end = loaded.full_solution(constraints.force(y[0], y[1:].T))
+            lag = -constraints.gaps_at_rest() - np.stack([R @ u_end for R in (constraints.B, *constraints.tangents)])
             lag -= eliminated.diagonal_compliance(constraints) * y
             lag[0] += path.gap
             lag = np.where(usable, lag, 0.0)
@@ -179,7 +179,7 @@ class _IncludedProblem:
     Attributes
     ----------
     F : Delassus (n, n)
-        Sum of the Delassus operator and the compliance of the constraints. It has no rows for the slips of constraints whose
+        Delassus operator, including the compliance of the constraints. It has no rows for the slips of constraints whose
         pair has no friction; the slips along held tangents are decoupled from all other components.
     free : ndarray (1 + k, q)
         Gaps and slips without contact forces [length].
@@ -210,7 +210,10 @@ class _IncludedProblem:
     def in_increments(
         self, y0: Array, closing: Array, waiting: Mask
     ) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array, float]]:
-        """Return the solution along the load path, see `solution.in_increments`, given `LoadPath.along` (1 + k, q)."""
+        """Return the solution along the load path, see `solution.in_increments`.
+
+        `y0` and `closing` (1 + k, q) are those of `LoadPath.along`, rotated by Q.
+        """
         y0[1:][self.held_slips], closing[1:][self.held_slips] = 0.0, 0.0
         lag = -self.free - self._gap_changes(y0)
         lag[0] += closing[0]
@@ -218,13 +221,13 @@ class _IncludedProblem:
 
     def _increment(self, offset: Array, carrying: Mask, closed: Mask, start: Array | None) -> FrictionSolution:
         """See `solution.IncrementSolver`."""
-        gaps, at = self.free + offset, np.flatnonzero(carrying)
-        number = numbers_at(self.components, gaps.shape)[:, at]
+        gaps, rows = self.free + offset, np.flatnonzero(carrying)
+        number = numbers_at(self.components, gaps.shape)[:, rows]
         components = np.flatnonzero(number >= 0)
-        F, start = self.F.submatrix(number.ravel()[components]), None if start is None else start[:, at]
-        result = dense.solve(F, gaps[:, at], self.mu[at], closed[at], start, self.equality[at], components)
+        F, start = self.F.submatrix(number.ravel()[components]), None if start is None else start[:, rows]
+        result = dense.solve(F, gaps[:, rows], self.mu[rows], closed[rows], start, self.equality[rows], components)
         y, (closed, sticking) = np.zeros_like(gaps), np.zeros((2, len(carrying)), bool)
-        y[:, at], closed[at], sticking[at] = result.y, result.closed, result.sticking
+        y[:, rows], closed[rows], sticking[rows] = result.y, result.closed, result.sticking
         return replace(result, y=y, gaps=gaps + self._gap_changes(y), closed=closed, sticking=sticking)
 
     def response(self, loaded: Loaded, R: csr_array, row_numbers: Indices, result: FrictionSolution) -> Response:
@@ -233,16 +236,16 @@ class _IncludedProblem:
             return response(loaded, R, row_numbers, np.zeros_like)
         # Constraints that are equations have no friction.
         law, sticking = Law(np.where(self.equality, 0.0, self.mu), self.equality), result.sticking & ~self.equality
-        unit, at = dense.units_of_force(self.F, len(self.mu)), self.components
-        F, y, gaps = self.F.scaled(unit[at % len(unit)]), result.y / unit, result.gaps * unit
-        equations = dense.linearised_equations(law, F, y, gaps, result.closed, sticking, at)
+        unit, components = dense.units_of_force(self.F, len(self.mu)), self.components
+        F, y, gaps = self.F.scaled(unit[components % len(unit)]), result.y / unit, result.gaps * unit
+        equations = dense.linearised_equations(law, F, y, gaps, result.closed, sticking, components)
         solve_dense = lu_solver(equations.A)
-        Q = None if self.Q is None else csr_array(self.Q[at][:, at])
+        Q = None if self.Q is None else csr_array(self.Q[components][:, components])
 
         def forces_of(gaps: Array) -> Array:
-            values = scattered(gaps if Q is None else Q @ gaps, at, result.y.shape) * unit
+            values = scattered(gaps if Q is None else Q @ gaps, components, result.y.shape) * unit
             values[1:][self.held_slips] = 0.0  # slips along held tangents do not vary
-            change = (equations.forces(values, solve_dense) * unit).ravel()[at]
+            change = (equations.forces(values, solve_dense) * unit).ravel()[components]
             return change if Q is None else np.asarray(Q.T @ change)
 
         return response(loaded, R, row_numbers, forces_of)

@@ -150,7 +150,7 @@ class Formulation(ContactSides, ABC):
         if self.options.cohesion is not None:
             positions, gaps = self._initial_gaps
             initial_gap = gaps[nearest(positions, constraints.positions)[1]]
-            body_stiffness = self.modulus / self.shortest_edge
+            body_stiffness = self.modulus / self.smallest_node_spacing
             return cohesive_rows(self.options.cohesion, constraints, config, initial_gap, body_stiffness)
         equality = self.never_opening(constraints.positions, config)
         constraints = replace(constraints, equality=equality, friction=config.friction_factor * constraints.friction)

@@ -8,16 +8,17 @@ In each pairing the secondary facets are divided into segments with Gauss points
 The integrals are thus exact, and a uniform pressure is transmitted exactly between non-matching meshes. Neither
 node-to-segment contact nor quadrature over complete facets achieves this.
 
-Segments without an opposite facet carry no pressure, and the pressure field is projected over the other segments. If the
-primary surface ends within a secondary facet, the pressure ends at this point. The pressure at an integration point and the
-complementarity conditions are those of `_pressure_field`.
+Segments without an opposite facet carry no pressure, and the projection of the pressure field is integrated over the other
+segments only. If the primary surface ends within a secondary facet, the pressure ends at this point. The pressure at an
+integration point and the complementarity conditions are those of `_pressure_field`.
 
 If only a strip of a facet faces the other side, the integration points in this strip hardly determine a field over the
 complete facet. On a strip of the fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the
-other end has a weight proportional to :math:`\theta^{2k+1}`. The criterion is the smallest generalised eigenvalue of two mass
-matrices of the facet, one integrated over the covered part and one over the complete facet. If this eigenvalue is too small,
-the field is simplified: it becomes linear between the corners of a quadratic facet, or the mean of the values at nodes that
-other facets determine. Constant fields remain representable, so that a uniform pressure is transmitted.
+other end has a weight proportional to :math:`\theta^{2k+1}`. Whether the covered part determines a field is decided by the
+smallest generalised eigenvalue of two mass matrices of the facet, one integrated over the covered part and one over the
+complete facet. If this eigenvalue is too small, the field is simplified. It becomes linear between the corners of a quadratic
+facet. If a linear field is not determined either, values at the corners that no other facet determines are the mean of those
+that other facets determine. Constant fields remain representable, so that a uniform pressure is transmitted.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import SINGLE_PRECISION
 
 # Smallest generalised eigenvalue at which a field counts as determined. For a linear field about a seventh of the length of
-# a line must be covered, for a quadratic field two fifths. Errors at the other end are then amplified by at most 30.
+# a line must be covered, for a quadratic field two fifths. Errors at the uncovered end are then amplified by at most 30.
 SMALLEST_EIGENVALUE = 1e-3
 
 
@@ -101,14 +102,16 @@ def _smallest_eigenvalues(full: Array, mass: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
 
-def independent_values(side: Surface, field: CompleteFacets, mass: Array, excluded: Mask) -> tuple[csr_array, Indices]:
+def independent_values(
+    side: Surface, complete_facets: CompleteFacets, mass: Array, excluded: Mask
+) -> tuple[csr_array, Indices]:
     """Return the map from the independent values of the field to all nodal values, and the nodes of the independent values.
 
     Parameters
     ----------
     side : Surface
         The secondary side, with m nodes.
-    field : CompleteFacets
+    complete_facets : CompleteFacets
         Mass matrices of the complete facets.
     mass : ndarray (n_facets, n_nodes, n_nodes)
         Integrals of products of two shape functions over the covered part of each facet [area].
@@ -122,9 +125,10 @@ def independent_values(side: Surface, field: CompleteFacets, mass: Array, exclud
     nodes : ndarray of int (k,)
         Node of each independent value.
     """
-    degree, local, is_independent = field.degrees(mass), field.block.local, np.zeros(len(side.points), bool)
+    degree, local = complete_facets.degrees(mass), complete_facets.block.local
+    n_corners, is_independent = len(complete_facets.to_corners), np.zeros(len(side.points), bool)
     is_independent[local[degree == 2]] = True
-    is_independent[local[degree == 1][:, : len(field.to_corners)]] = True
+    is_independent[local[degree == 1][:, :n_corners]] = True
     is_independent &= ~excluded
     # In a facet without an independent node, the node with the largest covered area becomes independent.
     for facet in np.flatnonzero((degree >= 0) & ~is_independent[local].any(axis=1)):
@@ -134,12 +138,12 @@ def independent_values(side: Surface, field: CompleteFacets, mass: Array, exclud
     independent = np.flatnonzero(is_independent)
     values = nodal_map(side, excluded, independent)
     if (degree[degree >= 0] < 2).any():
-        values = _with_interpolated_rows(values, field, local[degree >= 0], is_independent, excluded)
+        values = _with_interpolated_rows(values, complete_facets, local[degree >= 0], is_independent, excluded)
     return csr_array(values[:, independent]), independent
 
 
 def _with_interpolated_rows(
-    values: csr_array, field: CompleteFacets, local: Indices, is_independent: Mask, excluded: Mask
+    values: csr_array, complete_facets: CompleteFacets, local: Indices, is_independent: Mask, excluded: Mask
 ) -> csr_array:
     """Return the map `values` (m, m) with rows added for nodes that are neither independent nor excluded.
 
@@ -147,7 +151,8 @@ def _with_interpolated_rows(
     interpolated linearly between the corners. `local` (n, k) are the nodes of the facets that are at least partly covered.
     """
     m, has_value = len(is_independent), is_independent | excluded
-    corners = local[:, : len(field.to_corners)]
+    to_corners = complete_facets.to_corners
+    corners = local[:, : len(to_corners)]
     row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
     selected = ~has_value[row] & is_independent[column]
     row, column = np.unique(np.column_stack([row[selected], column[selected]]), axis=0).T
@@ -157,7 +162,7 @@ def _with_interpolated_rows(
     interpolation = lil_array((m, m))
     for facet, k in zip(*np.nonzero(~has_value[local[:, corners.shape[1] :]]), strict=True):
         # The facets on both sides of an edge have the same row.
-        interpolation[local[facet, corners.shape[1] + k], corners[facet]] = field.to_corners[:, corners.shape[1] + k]
+        interpolation[local[facet, corners.shape[1] + k], corners[facet]] = to_corners[:, corners.shape[1] + k]
     return csr_array(values + csr_array(interpolation) @ values)
 
 
@@ -199,7 +204,7 @@ class SegmentMortar(PressureFieldFormulation):
         return SegmentMortar if dim == 2 and has_standard else WeightedMortar
 
     def unilateral(self, config: Configuration) -> Constraints:
-        """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
+        """Intersect the facets in the deformed configuration, and return one constraint per integration point."""
         assert isinstance(self.primary, Surface)
         block, primary = self.secondary.blocks[0], config.deformed(self.primary, self.points)
         n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss

@@ -65,7 +65,7 @@ class Iteration:
         """Restart from `x` and its residual `r`, both set by the caller."""
         self.norm, self._last_step = float(np.sqrt(self.dot(self.r, self.r))), None
 
-    def change_rate(self, n: int) -> float:
+    def change_per_residual(self, n: int) -> float:
         """Return the largest change of the first n unknowns in the last step, divided by the decrease of the residual norm.
 
         If the rate of convergence persists, the remaining error is this ratio times the norm of the residual. The ratio

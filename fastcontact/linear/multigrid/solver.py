@@ -119,7 +119,8 @@ class Multigrid:
         """Reset the statistics of warm starts for a new load step."""
         # Residual norm of the last initial guess after which the iteration stopped at the largest number of warm iterations.
         self._max_warm_iterations, self._unfinished_norm = MAX_WARM_ITERATIONS, np.inf
-        self._change_rate = np.inf  # change of displacements in an iteration, divided by the decrease of the residual
+        # Change of displacements in an iteration, divided by the decrease of the residual.
+        self._change_per_residual = np.inf
 
     @property
     def nbytes(self) -> int:
@@ -388,10 +389,11 @@ class Multigrid:
         if iteration.norm > tolerance * scale:
             return False
         n = self.K.shape[0]
-        self._change_rate = iteration.change_rate(n) or self._change_rate
+        self._change_per_residual = iteration.change_per_residual(n) or self._change_per_residual
         if tolerance > self.tolerance or not iteration.norm:
             return True
-        return self._change_rate * iteration.norm <= DISPLACEMENT_ERROR * self.tolerance * largest(iteration.x[:n])
+        error = self._change_per_residual * iteration.norm
+        return error <= DISPLACEMENT_ERROR * self.tolerance * largest(iteration.x[:n])
 
     def _count(self) -> None:
         """Count one iteration."""

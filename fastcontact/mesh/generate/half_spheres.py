@@ -61,15 +61,16 @@ def half_spheres(
         Only for triangles: distance from the pole up to which edges have the length `contact_size`, at most R/2; by
         default 0 [length].
     arc_sizes : (float, float), optional
-        Only for quadrangles: lengths of the segments of the arc C-D at C and at D, in geometric progression between
-        these points; by default R/250 and R/25 [length]. Both are reduced by a common factor such that the segments
-        fill the arc.
+        Only for quadrangles: lengths of the segments at the ends C and D of the arc C-D; by default R/250 and R/25
+        [length]. The lengths in between form a geometric progression. All are reduced by a common factor such that the
+        segments fill the arc.
     segments : int, optional
         Only for quadrangles: number of segments on the side A-M of the inner square, on the arc D-B, and on the radial
         lines M-C, N-D and P-B; by default 15.
     radial_sizes : (float, float), optional
-        Only for quadrangles: lengths of the segments of the radial line M-C at C and at M, in geometric progression
-        between these points [length]. By default there are `segments` segments with the ratio of lengths of the arc.
+        Only for quadrangles: lengths of the segments at the ends C and M of the radial line M-C [length]. The lengths in
+        between form a geometric progression. By default there are `segments` segments, whose lengths at C and at M have
+        the same ratio as those of the arc at C and at D.
 
     Returns
     -------
@@ -183,18 +184,18 @@ def _quadrangle_mesh(
     sizes = (R / 250, R / 25) if arc_sizes is None else arc_sizes
     near, far = each(partial(positive, at_most=length), "arc_sizes", sizes)
     on_arc = progression(length, near, far)
-    equal = np.linspace(0.0, 1.0, n + 1)
+    uniform = np.linspace(0.0, 1.0, n + 1)
     if radial_sizes is None:
         lengths = (near / far) ** (np.arange(n) / max(n - 1, 1))
-        outward = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
+        on_radius = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
     else:
         at_arc, at_square = each(partial(positive, at_most=0.5 * R), "radial_sizes", radial_sizes)
-        outward = progression(0.5 * R, at_square, at_arc)
-    return _three_blocks(R, on_arc, outward, equal)
+        on_radius = progression(0.5 * R, at_square, at_arc)
+    return _three_blocks(R, on_arc, on_radius, uniform)
 
 
-def _three_blocks(R: float, on_arc: Array, outward: Array, equal: Array) -> Mesh:
-    """Return the lower body from the relative abscissae of the nodes on C-D, on M-C and on the equally divided sides."""
+def _three_blocks(R: float, on_arc: Array, on_radius: Array, uniform: Array) -> Mesh:
+    """Return the lower body, given the relative positions of the nodes on C-D, on M-C and on the uniformly divided sides."""
     corners = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
 
     def line(start: str, end: str, relative: Array) -> Array:
@@ -202,13 +203,13 @@ def _three_blocks(R: float, on_arc: Array, outward: Array, equal: Array) -> Mesh
 
     angle_D = 0.25 * math.pi
     contact_arc = arc((0.0, -R), R, angle_D * on_arc)
-    outer_arc = arc((0.0, -R), R, angle_D * (2.0 - equal))
+    outer_arc = arc((0.0, -R), R, angle_D * (2.0 - uniform))
     bottom, top = line("A1", "P1", on_arc), line("M1", "N1", on_arc)  # sides of the square
-    right, radial = line("P1", "N1", equal), line("N1", "D1", outward)
+    right, radial = line("P1", "N1", uniform), line("N1", "D1", on_radius)
     radial[-1] = contact_arc[-1] = outer_arc[-1]  # D1 is common to three sides, which must agree bitwise
-    square = coons_patch(bottom, right, top, line("A1", "M1", equal), on_arc, equal)
-    upper = coons_patch(top, radial, contact_arc, line("M1", "C1", outward), on_arc, outward)
-    outer = coons_patch(line("P1", "B1", outward), outer_arc, radial, right, outward, equal)
+    square = coons_patch(bottom, right, top, line("A1", "M1", uniform), on_arc, uniform)
+    upper = coons_patch(top, radial, contact_arc, line("M1", "C1", on_radius), on_arc, on_radius)
+    outer = coons_patch(line("P1", "B1", on_radius), outer_arc, radial, right, on_radius, uniform)
     blocks = [
         grid_mesh(square, "SPHBAS", {"BOTTOM": "A1B1", "LEFT": "A1A2"}),
         grid_mesh(upper, "SPHBAS", {"TOP": "CONT1", "LEFT": "A1A2"}),
@@ -240,7 +241,8 @@ def rings(
     inner_radius, interface_radius, outer_radius : float
         Radii of the bore, of the interface and of the rim, in ascending order [length].
     divisions_inner, divisions_outer : (int, int)
-        Numbers of cells of each ring in the radial and in the circumferential direction; the latter may differ.
+        Numbers of cells of each ring in the radial and in the circumferential direction. The circumferential
+        numbers of the two rings may differ.
 
     Returns
     -------

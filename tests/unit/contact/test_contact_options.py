@@ -42,7 +42,7 @@ def test_wrong_options_are_named(options, words):
 
 def test_a_ramp_must_cover_the_analysis():
     case = case_with("clearance = 0.1\nclearance_ramp = [[0, 0], [0.5, 1]]")
-    with pytest.raises(fc.ModelError, match=r"clearance of contact 'pair' covers 0 to 0.5, but .* instant 1"):
+    with pytest.raises(fc.ModelError, match=r"clearance of contact 'pair' covers 0 to 0.5, but a load step ends at 1"):
         fc.solve(case.model, case.ramp)
 
 

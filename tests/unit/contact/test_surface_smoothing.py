@@ -220,7 +220,7 @@ def test_steps_with_nodes_and_with_gauss_points_at_corners_are_of_different_case
 def test_an_obstacle_has_no_facets_to_smooth():
     model = fit(kind="tied", clearance=None)
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-    with pytest.raises(fc.ContactError, match="leave it out at an obstacle"):
+    with pytest.raises(fc.ContactError, match="omit it for an obstacle"):
         model.add_obstacle("rod", secondary="BORE", obstacle=plane, surface_smoothing=True)
 
 

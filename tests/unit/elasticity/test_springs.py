@@ -149,7 +149,7 @@ def test_a_far_end_without_a_body_may_be_fixed_or_is_told():
     step = last(pulled(True))
     assert step.displacement[mesh.point("BOTTOM_LEFT"), 0] == pytest.approx(0.4, rel=1e-12)
     assert step.reaction[mesh.point("ANCHOR"), 0] == pytest.approx(-2.0, rel=1e-12)
-    with pytest.raises(fc.ModelError, match="not supported"):
+    with pytest.raises(fc.ModelError, match="not restrained"):
         pulled(False).check()
 
 

@@ -40,7 +40,7 @@ def test_a_square_on_the_corner_of_another_is_refused(element):
 def test_a_box_on_the_edge_or_corner_of_another_is_refused(element, height, motions):
     model = elastic_model(boxes(element, height), A_YMIN="xyz")
     refused(
-        fc.ModelError, rf"{motions} not supported: .*part 'B_BOX' that is connected at \w+ \d+ at \(1, 1, ", model.check
+        fc.ModelError, rf"{motions} not restrained: .*part 'B_BOX' that is connected at \w+ \d+ at \(1, 1,", model.check
     )
     model.fix("B_YMAX", "xyz")
     model.check()
@@ -165,7 +165,9 @@ def test_halves_of_a_cut_bolt_have_its_name_and_each_motion_is_listed_once():
         assert parts.count(f"body {part}") == 3
     model = elastic_model(mesh, "plane_strain", NUT="xy")
     model.add_pretension("bolt", "BOLT_CUT", opposite="BOLT_CUT opposite", force=1.0)
-    whole = r"4 rigid-body motions are not supported: body 'BOLT': translation along x, rotation about \(0\.5, 0\.5\); "
+    whole = (
+        r"4 rigid-body motions are not restrained: body 'BOLT': translation along x, rotation about \(0\.5, 0\.5\); "
+    )
     halves = (
         r"the part around \(0\.5, 0\.5\): translation along y; the part around \(0\.5, 1\.5\): translation along y\."
     )
