@@ -64,6 +64,6 @@ class Stepping:
         return result
 
     def advance(self, index, begin, end):
-        """The same, cut in halves where it does not converge."""
+        """The same, halved where it does not converge."""
         self.state, result = step_halving.advance(self.problem, self.state, index, begin, end)
         return result

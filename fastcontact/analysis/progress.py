@@ -67,7 +67,7 @@ class Progress(StatusLine):
         super().__exit__(*raised)
 
     def _report_halving(self, index: int, begin: float, end: float) -> None:
-        self.draw(f"step {index}/{self._total} does not converge, cut in halves: {begin:.6g} to {end:.6g}")
+        self.draw(f"step {index}/{self._total} does not converge, halved: {begin:.6g} to {end:.6g}")
 
     def step(self, step: StepResult, complete: int | None = None) -> None:
         """Redraw after a step; `complete` steps are done, by default all up to this one."""

@@ -81,7 +81,7 @@ def _substeps(
             after, result = load_step(problem, state, index, end)
             ambiguous = not is_last and _has_two_equilibria(problem, state, after, index)
             if ambiguous:
-                log.info("step %d from %.6g to %.6g has two equilibria with friction, cut in halves", index, begin, end)
+                log.info("step %d from %.6g to %.6g has two equilibria with friction, halved", index, begin, end)
             if is_last or not (ambiguous or _slides_while_touching(problem, state, after)):
                 if problem.bodies is not None:  # how many times the next step is halved before its first attempt
                     converged_fast = len(result.iterations["history"]) <= FEW_ITERATIONS
@@ -92,7 +92,7 @@ def _substeps(
                 where = f"from {begin:.6g} to {end:.6g}"
                 times = "once" if halved == 1 else f"{halved} times"
                 if halved:
-                    location = f"step {index} was cut in halves {times}, the part {where} fails"
+                    location = f"step {index} was halved {times}, the part {where} fails"
                 else:  # only a step that has not been halved may converge in smaller ones
                     more = "; more load steps may help" if error.smaller_steps_help else ""
                     location = f"step {index} {where}{more}"
@@ -103,7 +103,7 @@ def _substeps(
             reason = str(error).split(". ")[0]
             for listener in listeners:
                 listener(index, begin, end)
-            log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
+            log.warning("step %d from %.6g to %.6g does not converge, halved: %s", index, begin, end, reason)
     state, first = _substeps(problem, state, index, (begin, middle), halved + 1)
     state, second = _substeps(problem, state, index, (middle, end), halved + 1)
     return state, first + second

@@ -13,7 +13,7 @@ from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
 from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
-HELP = "pressure along the contact line compared with theory: CSV, XMGRACE .agr, PNG"
+HELP = "contact pressure along the surface compared with theory: CSV, XMGRACE .agr, PNG"
 ARGUMENTS = {
     **_results.ARGUMENTS,
     "--csv FILE": "write the table",

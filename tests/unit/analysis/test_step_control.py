@@ -58,7 +58,7 @@ def test_a_step_that_fails_whole_ends_as_if_its_parts_had_been_asked_for():
 def test_a_step_that_cannot_converge_says_how_often_it_was_cut():
     handed = []
     criteria = fc.Criteria(max_geometry_updates=2, max_halvings=2)
-    with pytest.raises(fc.ConvergenceError, match=r"step 1 was cut in halves 2 times, .* 0 to 0\.25 fails") as caught:
+    with pytest.raises(fc.ConvergenceError, match=r"step 1 was halved 2 times, .* 0 to 0\.25 fails") as caught:
         fc.solve(spheres(), fc.linear_ramp(1), linear_solver="direct", criteria=criteria, on_step=handed.append)
     assert not handed
     assert caught.value.__cause__ is None  # the same words are told once
@@ -73,7 +73,7 @@ def test_progress_tells_that_a_step_is_cut(capsys):
     model = spheres(friction=0.0)
     fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=fc.Criteria(**limits), progress=True)
     told = [text.strip() for text in capsys.readouterr().err.split("\r")]
-    assert "step 1/1 does not converge, cut in halves: 0 to 1" in told
+    assert "step 1/1 does not converge, halved: 0 to 1" in told
     assert not step_halving.listeners
 
 

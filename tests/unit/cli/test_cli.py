@@ -95,10 +95,10 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     assert code == 2
     cut, told, *history, kept = capsys.readouterr().err.splitlines()
     assert cut.startswith(
-        "step 2 from 0.001 to 1 does not converge, cut in halves: the contact geometry did not converge"
+        "step 2 from 0.001 to 1 does not converge, halved: the contact geometry did not converge"
     )
     assert told.startswith("no convergence: ")
-    assert "step 2 was cut in halves once, the part from " in told
+    assert "step 2 was halved once, the part from " in told
     assert [line.split()[0] for line in history] == ["iterations", "1", "2", "3"]
     path = tmp_path / "hard.vtkhdf"
     assert kept == f"  '{path}' keeps one complete step: 'fastcontact run --resume' continues from there"
@@ -123,7 +123,7 @@ def test_steps_that_went_in_parts_are_told(solved, tmp_path, capsys):
     )
     assert main(["run", str(case), "-o", str(path), "--json", str(summary)]) == 0
     captured = capsys.readouterr()
-    assert "step 1 from 0 to 1 does not converge, cut in halves: " in captured.err
+    assert "step 1 from 0 to 1 does not converge, halved: " in captured.err
     (step,) = json.loads(summary.read_text())["steps"]
     ends = step["substeps"]
     assert len(ends) > 1
