@@ -112,7 +112,7 @@ def result_warnings(
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += pressures or _shear_oscillation(pair, contact)
         warnings += [*at_edge, *_sliding_past_ends(pair, contact)]
-        warnings += _excessive_wear(name, pair, state)
+        warnings += _excessive_wear(name, pair, state, not pressures)
     warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_energy_imbalance(state)]
     return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]
 
@@ -209,12 +209,15 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
         )
 
 
-def _excessive_wear(name: str, pair: Formulation, state: State) -> Iterator[str]:
-    """Yield warnings about a coefficient of wear in another unit, and about a contact that moves too far in a load step."""
+def _excessive_wear(name: str, pair: Formulation, state: State, is_smooth: bool) -> Iterator[str]:
+    """Yield warnings about a coefficient of wear in another unit, and about a contact that moves too far in a load step.
+
+    Unless pressures are smooth, nodes also open and close in a contact that does not move.
+    """
     if name not in state.worn:
         return
     worn, factor = state.worn[name], ratio_to_elastic_waves(pair, state.worn[name])
-    if (passing := worn.passing / max(float(worn.depth.sum()), TINY)) > WARNING_RATIO:
+    if is_smooth and (passing := worn.passing / max(float(worn.depth.sum()), TINY)) > WARNING_RATIO:
         yield (
             f"contact '{name}' moves along '{pair.secondary.group}', and {passing:.0%} of the wear there is that of nodes in "
             "the load step in which it reaches or leaves them. Depths deviate by up to this fraction from node to node, but "

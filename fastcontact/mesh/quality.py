@@ -219,6 +219,5 @@ def extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
     element, x = elements.get(name), mesh.points[mesh.cells[name]]
     _, gradients, weights = element.tables
     determinants = quadrature.jacobians(x, gradients)
-    ends = x[:, element.edges]
-    longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
+    longest = np.max([np.linalg.norm(x[:, end] - x[:, begin], axis=1) for begin, end in element.edges], axis=0)
     return weights @ determinants, determinants.min(axis=0), determinants.max(axis=0), longest

@@ -24,7 +24,7 @@ CASES = [
     ("entry of supports is a word", '[[support]]\ngroup = "A1A2"\nx = 0.0', 'support = ["A1A2"]\n', r"case\.toml"),
     ("theory without kind", 'kind = "hertz_point"\n', "", r"'theory\.hertz' needs the key 'kind', one of "),
     ("radius in words", "R1 = 50.0", 'R1 = "fifty"', r"'theory\.hertz': R1 is 'fifty': it must be a finite number"),
-    ("motion of an obstacle is a number", "[probes]", '[obstacle.ball]\nsecondary = "CONT1"\nmotion = 3.0\nshape = { kind = "sphere", centre = [0.0, 0.0], R = 1.0 }\n[probes]', r"'obstacle\.ball\.motion' must be a table of keys, not 3\.0"),
+    ("motion of an obstacle is a number", "[probes]", '[obstacle.ball]\nsecondary = "CONT1"\nmotion = 3.0\nshape = { kind = "sphere", centre = [0.0, 0.0], R = 1.0 }\n[probes]', r"'obstacle\.ball\.motion' must be a table of numbers by name, not the float 3\.0"),
     ("radius of an obstacle is a list", "[probes]", '[obstacle.ball]\nsecondary = "CONT1"\nshape = { kind = "sphere", centre = [0.0, 0.0], R = [1.0] }\n[probes]', r"the value of 'obstacle\.ball\.shape\.R' must be a number, not the tuple \(1\.0,\)"),
     ("target of a check is zero", 'theory = "hertz"\ntolerance', 'theory = "hertz"\nof = "beyond"\ntolerance', r"unknown number of the theory in check\[0\]\.of 'beyond'"),
     ("unknown pair of a study", "[study]", '[study]\ncontact = "herz"', r"unknown contact pair in study\.contact 'herz': did you mean 'hertz'\?"),
