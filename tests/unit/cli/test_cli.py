@@ -94,9 +94,7 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf"), "--json", str(summary)])
     assert code == 2
     cut, told, *history, kept = capsys.readouterr().err.splitlines()
-    assert cut.startswith(
-        "step 2 from 0.001 to 1 does not converge, halved: the contact geometry did not converge"
-    )
+    assert cut.startswith("step 2 from 0.001 to 1 does not converge, halved: the contact geometry did not converge")
     assert told.startswith("no convergence: ")
     assert "step 2 was halved once, the part from " in told
     assert [line.split()[0] for line in history] == ["iterations", "1", "2", "3"]
