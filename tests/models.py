@@ -8,6 +8,10 @@ import numpy as np
 import fastcontact as fc
 from fastcontact.mesh import elements
 
+FLAT, SOLIDS = ([e.name for e in elements.ELEMENTS.values() if e.dim == dim] for dim in (2, 3))
+CELLS = [(kinematics, name) for kinematics in ("plane_strain", "plane_stress", "axisymmetric") for name in FLAT]
+CELLS += [("3d", name) for name in SOLIDS]
+
 
 def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **given):
     """Return a model of one elastic material with supports, as for `supported`: ``elastic_model(mesh, ZMIN="xyz")``.

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact import generate, topology
@@ -85,22 +85,21 @@ def cracked():
     return held(square_in_two().mesh, BOTTOM="xy")
 
 
+def merged(divisions, origin):
+    """A block with another one at `origin`, of which common nodes were merged; the first one is held."""
+    parts = {"A": block((1.0, 1.0), (2, 2)), "B": block((1.0, 1.0), divisions, origin=origin)}
+    mesh = united(**{f"{name}_": part for name, part in parts.items()})
+    return held(generate.merge_points(mesh, 1e-9), A_BOTTOM="xy")
+
+
 def torn():
     """A coarse block and a fine one on it, of which only the nodes of both were merged."""
-    mesh = generate.union(
-        generate.renamed(block((1.0, 1.0), (2, 2)), {"BLOCK": "A_BLOCK", "BOTTOM": "A_BOTTOM"}),
-        block((1.0, 1.0), (4, 2), origin=(0.0, 1.0)),
-    )
-    return held(generate.merge_points(mesh, 1e-9), A_BOTTOM="xy")
+    return merged((4, 2), (0.0, 1.0))
 
 
 def hanging_together():
     """A block on the corner of another one, whose common node was merged; only the lower one is held."""
-    mesh = generate.union(
-        generate.renamed(block((1.0, 1.0), (2, 2)), {"BLOCK": "A_BLOCK", "BOTTOM": "A_BOTTOM"}),
-        generate.renamed(block((1.0, 1.0), (2, 2), origin=(1.0, 1.0)), {"BLOCK": "B_BLOCK", "BOTTOM": "B_BOTTOM"}),
-    )
-    return held(generate.merge_points(mesh, 1e-9), A_BOTTOM="xy")
+    return merged((2, 2), (1.0, 1.0))
 
 
 def with_materials(*given):

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -16,10 +16,6 @@ SOLID = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "pyrami
 E, NU = 1000.0, 0.3
 
 
-def model_on(mesh, kinematics, **held):
-    return elastic_model(mesh, kinematics, E=E, nu=NU, **held)
-
-
 # --- exact fields -------------------------------------------------------------------------------------------------
 
 
@@ -27,7 +23,7 @@ def model_on(mesh, kinematics, **held):
 @pytest.mark.parametrize("element", PLANE)
 def test_uniform_pressure_gives_a_uniform_stress(element, kinematics):
     mesh = fc.generate.block((2.0, 3.0), (3, 4), element, distortion=0.2 if element in PLANE[:3] else 0.0)
-    model = model_on(mesh, kinematics, LEFT="x", BOTTOM="y")
+    model = elastic_model(mesh, kinematics, LEFT="x", BOTTOM="y")
     model.add_pressure("TOP", 5.0)
     model.add_pressure("RIGHT", 2.0)
     last = fc.solve(model, 1)[-1]
@@ -40,7 +36,7 @@ def test_uniform_pressure_gives_a_uniform_stress(element, kinematics):
 @pytest.mark.parametrize("element", SOLID)
 def test_uniform_pressure_gives_a_uniform_stress_in_3d(element):
     mesh = fc.generate.box((2.0, 3.0, 1.0), (2, 2, 2), element)
-    model = model_on(mesh, "3d", XMIN="x", YMIN="y", ZMIN="z")
+    model = elastic_model(mesh, "3d", XMIN="x", YMIN="y", ZMIN="z")
     model.add_pressure("XMAX", 2.0)
     model.add_traction("YMAX", y=3.0)
     model.add_force("ZMAX", z=-4.0 * 6.0)
@@ -64,7 +60,7 @@ def test_a_thick_cylinder_converges_to_lame(element, order, kinematics):
     sizes, errors = (4, 8, 16), []
     for n in sizes:
         mesh = ring(element, n)
-        model = model_on(mesh, kinematics, BOTTOM="y", TOP="x")
+        model = elastic_model(mesh, kinematics, BOTTOM="y", TOP="x")
         model.add_pressure("LEFT", 10.0)  # the bore
         u = fc.solve(model, 1)[-1].displacement
         r = np.linalg.norm(mesh.points, axis=1)
@@ -73,20 +69,6 @@ def test_a_thick_cylinder_converges_to_lame(element, order, kinematics):
     fitted = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
     assert fitted > order
     assert errors[-1] < (1e-3 if order < 2 else 1e-5)
-
-
-def test_an_axisymmetric_cylinder_under_internal_pressure():
-    """The same ring turned about the axis; free ends: the stresses of plane stress."""
-    exact = fc.analytic.thick_cylinder(
-        E=E, nu=NU, inner_radius=1.0, outer_radius=2.0, inner_pressure=10.0, kinematics="plane_stress"
-    )
-    mesh = fc.generate.block((1.0, 0.2), (16, 2), "quad8", origin=(1.0, 0.0))
-    model = model_on(mesh, "axisymmetric", BOTTOM="y")
-    model.add_pressure("LEFT", 10.0)
-    last = fc.solve(model, 1)[-1]
-    r = mesh.points[:, 0]
-    assert np.abs(last.displacement[:, 0] / exact.displacement(r) - 1).max() < 1e-5
-    assert np.abs(last.stress[:, 2] - exact.hoop_stress(r)).max() < 2e-2
 
 
 @pytest.mark.parametrize("element", ["quad8", "tri6", "hex20", "tet10"])
@@ -108,16 +90,6 @@ def test_a_column_under_its_weight(element):
     assert last.reaction[:, axis].sum() == pytest.approx(8.0, rel=1e-12)
 
 
-def test_prescribed_functions_give_the_linear_field_they_name():
-    mesh = fc.generate.block((2.0, 1.0), (3, 2), "quad8")
-    edge = np.unique(np.concatenate([mesh.points_of(side) for side in ("LEFT", "RIGHT", "TOP", "BOTTOM")]))
-    model = model_on(mesh.with_groups(points={"EDGE": edge}), "plane_strain")
-    model.prescribe("EDGE", x=lambda p: 1e-3 * p[:, 0] + 2e-3 * p[:, 1], y=lambda p: -1e-3 * p[:, 1])
-    last = fc.solve(model, 1)[-1]
-    x, y = mesh.points.T
-    assert np.abs(last.displacement - np.column_stack([1e-3 * x + 2e-3 * y, -1e-3 * y])).max() < 1e-16 * 1e3
-
-
 # --- relations ----------------------------------------------------------------------------------------------------
 
 
@@ -128,7 +100,7 @@ def test_a_coupled_face_under_a_force_is_a_rigid_plate(solver):
     top = mesh.points_of("TOP")
 
     def prepared():
-        model = model_on(mesh, "plane_strain")
+        model = elastic_model(mesh, "plane_strain")
         return supported(model, BOTTOM="xy")
 
     forced = prepared()
@@ -154,7 +126,7 @@ def test_a_reference_point_carries_the_force_of_a_face():
     mesh = mesh.with_groups(points={"PILOT": [mesh.n_points - 1]})
     results = []
     for pilot in (False, True):
-        model = model_on(mesh, "plane_stress", BOTTOM="xy")
+        model = elastic_model(mesh, "plane_stress", BOTTOM="xy")
         if pilot:
             for node in top:
                 model.relate([(int(node), "y", 1.0), ("PILOT", "y", -1.0)])
@@ -170,7 +142,7 @@ def test_a_reference_point_carries_the_force_of_a_face():
 def test_a_relation_with_a_right_hand_side_and_its_reactions():
     """Two halves pulled apart by a given amount: the relation's forces are equal and opposite."""
     mesh = fc.generate.block_on_block("quad4", divisions_lower=(4, 2), divisions_upper=(4, 2))
-    model = model_on(mesh, "plane_stress", LOWER_BOTTOM="xy", UPPER_TOP="xy")
+    model = elastic_model(mesh, "plane_stress", LOWER_BOTTOM="xy", UPPER_TOP="xy")
     lower, upper = mesh.points_of("CONT_LOWER"), mesh.points_of("CONT_UPPER")
     order = [points[np.argsort(mesh.points[points, 0])] for points in (lower, upper)]
     for a, b in zip(*order, strict=True):
@@ -190,7 +162,7 @@ def test_a_relation_with_a_right_hand_side_and_its_reactions():
 
 def test_loads_with_their_own_histories():
     mesh = fc.generate.block((2.0, 1.0), (3, 2), "quad8")
-    model = model_on(mesh, "plane_strain", BOTTOM="y", LEFT="x")
+    model = elastic_model(mesh, "plane_strain", BOTTOM="y", LEFT="x")
     model.add_pressure("TOP", 5.0, ramp=[(0, 0), (1, 1), (3, 1)])
     model.add_pressure("RIGHT", 2.0, ramp=[(0, 0), (1, 0), (2, 1), (3, 0)])
     steps = fc.solve(model, fc.Ramp((0.5, 1.0, 2.0, 3.0), ((0, 0), (3, 7))))
@@ -226,6 +198,8 @@ def test_force_driven_is_displacement_driven(formulation, solver, steps, forma04
     assert np.abs(last.stress - moved.stress).max() < 1e-8 * np.abs(moved.stress).max()
     assert last.displacement[mesh.points_of("A2B2"), 1] == pytest.approx(-2.0, rel=1e-8)
     told = last.iterations["regularised"]
+    named = {"motions", "springs", "spring_stiffness", "force_left", "relative_to_load", "positions"}
+    assert set(told) == {*named, "undetermined", "moved"}
     assert told["motions"] == ["body 'SPHHAU': translation along y (the axis)"]
     assert told["spring_stiffness"] > 0
     assert told["relative_to_load"] < (1e-11 if solver == "direct" else 1e-8)
@@ -242,16 +216,6 @@ def test_a_body_comes_from_afar(gap, formulation):
     expected[upper, 1] -= gap
     assert np.abs(far.displacement - expected).max() < 1e-9 * 30.0
     assert np.abs(far.stress - near.stress).max() < 1e-8 * np.abs(near.stress).max()
-
-
-def test_what_was_regularised_is_kept_in_result_files(tmp_path):
-    model = driven_by_force(fc.generate.half_spheres("tri3", size=8.0), "node_to_segment", 1e5)
-    with fc.ResultWriter(tmp_path / "forced.vtkhdf", model) as out:
-        last = fc.solve(model, 1, on_step=out.write)[-1]
-    kept = fc.open_results(tmp_path / "forced.vtkhdf")[-1].iterations["regularised"]
-    assert kept == last.iterations["regularised"]
-    named = {"motions", "springs", "spring_stiffness", "force_left", "relative_to_load", "positions"}
-    assert set(kept) == {*named, "undetermined", "moved"}
 
 
 @pytest.mark.filterwarnings("ignore:the loads strain the model by about 2.9e-15")
@@ -374,7 +338,7 @@ def stack(load, motion):
     mesh = fc.generate.transform.union(
         two, fc.generate.transform.renamed(top, lambda name: names.get(name, "C" + name))
     )
-    model = model_on(mesh, "plane_strain", LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x", CAP_LEFT="x")
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x", CAP_LEFT="x")
     if motion:
         model.prescribe("CAP_TOP", y=-motion)
     if load:
@@ -398,7 +362,7 @@ def test_a_body_between_two_others_is_held_by_contact_alone():
 def test_friction_and_weight_hold_a_block(formulation):
     """A block free to move, turn and slide stays on its friction; its tangential force is what is applied."""
     mesh = fc.generate.block_on_block("quad4", divisions_lower=(6, 3), divisions_upper=(6, 3))
-    model = model_on(mesh, "plane_strain", LOWER_BOTTOM="xy")
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
     model.add_pressure("UPPER_TOP", 10.0, ramp=[(0, 0), (0.5, 1), (1, 1)])
     model.add_force("UPPER_LEFT", x=10.0, ramp=[(0, 0), (0.5, 0), (1, 1)])
     model.add_contact("base", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=0.3)
@@ -406,19 +370,6 @@ def test_friction_and_weight_hold_a_block(formulation):
         applied = [-20.0 * max(step.load_factor - 0.5, 0.0), 100.0 * min(2 * step.load_factor, 1.0)]
         assert step.contact["base"].force == pytest.approx(applied, abs=1e-9 * 100.0)
         assert len(step.iterations["regularised"]["springs"]) == 3
-
-
-def test_a_box_held_by_friction_alone_in_3d():
-    """On a box of another mesh."""
-    low = fc.generate.box((2.0, 2.0, 1.0), (3, 3, 2), name="LOWER")
-    high = fc.generate.box((2.0, 2.0, 1.0), (2, 2, 2), origin=(0.0, 0.0, 1.0), name="UPPER")
-    model = model_on(united(LOWER_=low, UPPER_=high), "3d", LOWER_ZMIN="xyz")
-    model.add_contact("base", secondary="UPPER_ZMIN", primary="LOWER_ZMAX", formulation="mortar", friction=0.4)
-    model.add_pressure("UPPER_ZMAX", 3.0)
-    model.add_force("UPPER_XMIN", x=2.0)
-    last = fc.solve(model, fc.linear_ramp(2))[-1]
-    assert last.contact["base"].force == pytest.approx([-2.0, 0.0, 12.0], abs=1e-9 * 12.0)
-    assert len(last.iterations["regularised"]["motions"]) == 6
 
 
 def test_a_sub_model_follows_the_stages_of_the_global_model():

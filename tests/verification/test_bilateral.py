@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from models import elastic_model
-from two_bodies import SIDES, blocks, boxes, held, touching
+from two_bodies import SIDES, blocks, boxes, each, held, touching
 
 import fastcontact as fc
 
@@ -17,13 +17,14 @@ PRESS_AND_PULL = fc.Ramp((1.0, 2.0), ((0.0, 0.0), (1.0, 1.0), (2.0, -1.0)))
 
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_a_uniform_tension_passes(formulation, kinematics, swap):
+@pytest.mark.parametrize("kind", ["bilateral", "tied"])
+@each
+def test_a_uniform_tension_passes(formulation, options, kind, kinematics, swap):
     apart = formulation == "mortar"  # the only one that meshes which do not match pass exactly
     mesh = (
         boxes(upper=(3, 2, 2) if apart else (2, 3, 2)) if kinematics == "3d" else blocks(upper=(4 if apart else 3, 2))
     )
-    model = touching(held(mesh, kinematics, -0.02), formulation, swap, kind="bilateral")
+    model = touching(held(mesh, kinematics, -0.02), formulation, swap, kind=kind, **options)
     last = fc.solve(model, fc.linear_ramp(1))[-1]
     axis, expected = (2 if kinematics == "3d" else 1), MODULUS[kinematics] * 0.002
     assert np.abs(last.stress[:, axis] - expected).max() < 1e-10 * expected
@@ -99,23 +100,6 @@ def test_a_body_may_hang_on_a_bilateral_pair():
     last = fc.solve(model, fc.linear_ramp(2))[-1]
     assert np.abs(last.stress[:, 1] - 2.0).max() < 1e-9
     assert last.iterations["regularised"]["relative_to_load"] < 1e-9
-
-
-@pytest.mark.parametrize("swap", [False, True])
-@pytest.mark.parametrize("make", [blocks, boxes])
-@pytest.mark.parametrize(("options", "expected"), [
-    ({"kind": "tied"}, -1.0), ({"kind": "bilateral"}, -1.0), ({"clearance": 0.005}, 0.75),
-    ({"clearance_primary": -0.01}, 1.5),
-], ids=str)  # fmt: skip
-def test_dual_multipliers_keep_the_same_terms(make, options, expected, swap):
-    mesh = make(upper=(4, 3) if make is blocks else (3, 2, 2))
-    kinematics = "3d" if mesh.dim == 3 else "plane_strain"
-    approach = -0.02 if "kind" in options else 0.02
-    model = touching(held(mesh, kinematics, approach), "mortar", swap, multipliers="dual", **options)
-    last = fc.solve(model, fc.linear_ramp(1))[-1]
-    pressure = expected * MODULUS[kinematics] * 0.002
-    assert np.abs(last.stress[:, mesh.dim - 1] + pressure).max() < 1e-10 * abs(pressure)
-    assert last.contact["pair"].pressure == pytest.approx(pressure, rel=1e-10)
 
 
 @pytest.mark.parametrize("multipliers", ["standard", "dual"])

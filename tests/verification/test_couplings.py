@@ -320,25 +320,6 @@ def test_springs_join_the_nodes_of_two_groups(element, kind):
     np.testing.assert_allclose(model.springs[0].tension(step.displacement), -0.3, rtol=1e-12)
 
 
-def test_columns_and_springs_in_series():
-    """Stiffness E A / L of both columns and n k of the springs, one after the other; nu = 0."""
-    mesh = two_blocks("quad4")
-    model = elastic_model(mesh, "plane_stress", nu=0.0)
-    groups = {}
-    for name, side in (("A", "TOP"), ("B", "BOTTOM2")):
-        points = mesh.points_of(side)
-        ends = np.isin(mesh.points[points, 0], [0.0, 2.0])
-        groups |= {f"{name}_INNER": points[~ends], f"{name}_ENDS": points[ends]}
-    model.mesh = mesh.with_groups(points=groups)
-    model.add_spring("A_INNER", "B_INNER", y=50.0, x=10.0)  # shares of 1/4 and 1/8: the pressure stays uniform
-    model.add_spring("A_ENDS", "B_ENDS", y=25.0, x=10.0)
-    supported(model, BOTTOM="y", LEFT="x")
-    model.add_traction("TOP2", y=-1.0)
-    step = fc.solve(model, fc.linear_ramp(1))[-1]
-    exact = -(2 * 1.0 * 1.0 / 1000.0 + 2.0 / 200.0)
-    np.testing.assert_allclose(step.displacement[mesh.points_of("TOP2"), 1], exact, rtol=1e-10)
-
-
 def test_one_node_is_joined_with_all_of_a_group():
     mesh = two_blocks("quad4")
     model = model_on(mesh)

@@ -323,24 +323,20 @@ def ball_on_ball(element, **options):
     return model
 
 
-def blocks(mesh, drawn=None, **options):
+def blocks(mesh, drawn=None, shift=4.0, sides=("CONT_UPPER", "CONT_LOWER"), **options):
     """A block drawn over a wider one."""
-    sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": 4.0}
+    sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": shift}
     mesh = fc.generate.block_on_block(mesh, **sizes, divisions_lower=(14, 4), divisions_upper=(9, 4))
     model = elastic_model(
         mesh, LOWER_BOTTOM="xy", **({"UPPER_TOP": {"x": 0.05, "y": -0.05}} if drawn is None else drawn)
     )
-    model.add_contact("hertz", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    model.add_contact("hertz", secondary=sides[0], primary=sides[1], **options)
     return model
 
 
 def punch(mesh, **options):
     """A block pressed into a wider one, whose facets are secondary and partly covered at the ends of the punch."""
-    sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": 4.03}
-    mesh = fc.generate.block_on_block(mesh, **sizes, divisions_lower=(14, 4), divisions_upper=(9, 4))
-    model = elastic_model(mesh, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
-    model.add_contact("hertz", secondary="CONT_LOWER", primary="CONT_UPPER", **options)
-    return model
+    return blocks(mesh, shift=4.03, sides=("CONT_LOWER", "CONT_UPPER"), **options)
 
 
 def seam(mesh, **options):

@@ -2,7 +2,6 @@
 
 import json
 
-import h5py
 import numpy as np
 import pytest
 from case_texts import case_of
@@ -183,25 +182,6 @@ def test_from_case_file_to_result_file(tmp_path):
         for step, stored in zip(steps, results, strict=True):
             place = stored.contact["plane"].obstacle_displacement
             assert place.tolist() == step.contact["plane"].obstacle_displacement.tolist()
-
-
-def test_files_without_the_place_of_obstacles_are_still_read(tmp_path):
-    with fc.ResultWriter(
-        tmp_path / "r.vtkhdf", model := block_under_a_ball("plane_strain", motion={"y": -0.01})
-    ) as out:
-        fc.solve(model, 1, on_step=out.write)
-    with h5py.File(tmp_path / "r.vtkhdf", "r+") as file:
-        pair = file["fastcontact/contact/0"]
-        table = pair["steps"][()]
-        names = [name for name in table.dtype.names if name != "obstacle_displacement"]
-        del pair["steps"]
-        old = np.zeros(len(table), [(name, table.dtype[name]) for name in names])
-        for name in names:
-            old[name] = table[name]
-        pair["steps"] = old
-    contact = fc.open_results(tmp_path / "r.vtkhdf")[-1].contact["ball"]
-    assert contact.obstacle_displacement is None
-    assert contact.force[1] < 0
 
 
 FRICTION, RADIUS = 0.3, 10.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import CELLS, elastic_model, made_of, supported
 from pairwise import first_of
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -236,15 +236,7 @@ def changes_of(step) -> list[float]:
 
 @pytest.mark.filterwarnings("ignore:(tri3|tet4) cells lock:fastcontact.FastcontactWarning")
 @pytest.mark.parametrize("law", [*LAWS, *YIELDING])
-@pytest.mark.parametrize(
-    ("kinematics", "element"),
-    [
-        *((kinematics, element) for kinematics in ("plane_strain", "plane_stress", "axisymmetric")
-          for element in ("tri3", "tri6", "quad4", "quad8", "quad9")),
-        *(("3d", element) for element in ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "wedge18",
-                                          "pyramid5", "pyramid13")),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("kinematics", "element"), CELLS)
 def test_iterations_converge_quadratically(kinematics: str, element: str, law: str) -> None:
     finite, solid = law in LAWS or "finite" in law, kinematics == "3d"
     if solid:

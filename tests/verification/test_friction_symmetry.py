@@ -9,7 +9,8 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, pressed_spheres, supported
+from two_bodies import arcs
 
 import fastcontact as fc
 
@@ -20,14 +21,12 @@ FACETS = [("node_to_segment", {}), ("node_to_segment", {"normals": "averaged"})]
 FIELDS = [("continuous", {}), ("mortar", {"multipliers": "standard"})]
 
 
-def spheres(element):
-    mesh = fc.generate.half_spheres(element, **MESHES[element])
-    return elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0})
+def spheres(element, name=None, **options):
+    return pressed_spheres(fc.generate.half_spheres(element, **MESHES[element]), name=name, **options)
 
 
 def pressed(element, formulation, steps=1, friction=0.3, criteria=None, **options):
-    model = spheres(element)
-    model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation, friction=friction, **options)
+    model = spheres(element, "pair", formulation=formulation, friction=friction, **options)
     return fc.solve(model, fc.linear_ramp(steps), criteria=criteria, linear_solver="direct")
 
 
@@ -140,17 +139,10 @@ FIT = [
 )
 def test_press_fit_between_planes_of_symmetry_sticks_without_shear(elements, turned, swap, options):
     """A tenth of two rings whose straight facets do not match: where facets end, their normals lean across the plane."""
-    space, angle, parts = elements in ("hex8", "tet4"), 0.2 * np.pi, []
+    space = elements in ("hex8", "tet4")
     ends = ("YMIN", "YMAX", "ZMIN", "ZMAX") if space else ("BOTTOM", "TOP")
-    for name, inside, cells in (("A", 1.0, 6), ("B", 2.0, 5)):
-        if space:
-            mesh = fc.generate.box((1.0, 1.0, 0.2), (3, cells, 1), elements)
-        else:
-            mesh = fc.generate.block((1.0, 1.0), (4, cells), elements)
-        r, t = inside + mesh.points[:, 0], turned + angle * mesh.points[:, 1]
-        mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), mesh.points[:, 2:]]))
-        parts.append(fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names}))
-    model = elastic_model(fc.generate.union(*parts), "3d" if space else "plane_strain")
+    cells = [(3, n, 1) if space else (4, n) for n in (6, 5)]
+    model = elastic_model(arcs(elements, cells, 0.2 * np.pi, turned))
     for name in "AB":
         for end in ends:
             model.fix(name + end, "normal")

@@ -4,40 +4,21 @@ import dataclasses
 
 import numpy as np
 import pytest
-from models import made_of, supported
+from models import CELLS, made_of, supported
 from pairwise import first_of
 from scipy.optimize import brentq
 
 import fastcontact as fc
 from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
+from fastcontact.mesh import elements
 from tests.verification.test_finite_strain import LAWS, cauchy, slope
 
-FLAT = ["tri3", "tri6", "quad4", "quad8", "quad9"]
-SOLID = [
-    "tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13",
-]  # fmt: skip
-# Of quadratic elements, those on their corners.
-LINEAR = {
-    "quad8": "quad4",
-    "quad9": "quad4",
-    "tri6": "tri3",
-    "tet10": "tet4",
-    "hex20": "hex8",
-    "wedge15": "wedge6",
-    "pyramid13": "pyramid5",
-}
-CELLS = [
-    *(("plane_strain", element) for element in FLAT),
-    *(("plane_stress", element) for element in FLAT),
-    *(("axisymmetric", element) for element in FLAT),
-    *(("3d", element) for element in SOLID),
-]
 PLASTIC = fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (1.0, 11.0)], kinematic=5.0)
 
 
 def distorted(kinematics: str, element: str) -> fc.Mesh:
     """Return a mesh whose inner corners do not lie in rows; cells with nodes on their faces are deformed smoothly."""
-    start = LINEAR.get(element, element)
+    start = elements.get(element).linear
     if element in ("hex27", "wedge18"):
         mesh = fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element=element)
         hat = np.prod(1.0 - np.abs(2.0 * mesh.points - 1.0), axis=1)

@@ -162,20 +162,6 @@ def test_it_is_there_from_the_first_step_on_or_has_a_history():
         np.testing.assert_allclose(found, -2.0 * 5.0 / E * np.array(factors), rtol=1e-9)
 
 
-def test_an_initial_gap_closes_by_a_swelling_block():
-    """Two blocks held at their ends, 0.01 apart: the swelling one crosses it, then both are pressed."""
-    mesh = fc.generate.block_on_block("quad4", size_lower=(10.0, 5.0), size_upper=(10.0, 5.0), divisions_upper=(8, 4))
-    model = elastic_model(mesh, "plane_stress", E=E, nu=0.0, LOWER_BOTTOM="y", UPPER_TOP="y", LOWER_LEFT="x")
-    model.fix("UPPER_LEFT", "x")
-    model.add_initial_strain("UPPER", yy=0.01, ramp=[(0.0, 0.0), (1.0, 1.0)])
-    model.add_contact("gap", secondary="CONT_UPPER", primary="CONT_LOWER", clearance=0.02)
-    steps = fc.solve(model, fc.Ramp((0.2, 1.0)))
-    assert not steps[0].contact["gap"].active.any()
-    pressure = E * (0.01 * 5.0 - 0.02) / 10.0
-    np.testing.assert_allclose(steps[1].contact["gap"].pressure, pressure, rtol=1e-9)
-    np.testing.assert_allclose(steps[1].stress[:, 1], -pressure, rtol=1e-9)
-
-
 # ----------------------------------------------------------------------------- case files, words, mistakes
 CASE = of_block("{}", "{}", LEFT="x", BOTTOM="y")
 

@@ -19,27 +19,22 @@ def same(one, other, tolerance=1e-10):
 
 
 # A node opposite a node may take the normal of either facet there, and keeps the one that the path led to.
-AVERAGED = [("node_to_segment", "averaged")]
+AVERAGED = [("node_to_segment", {"normals": "averaged"})]
 
 
-@pytest.mark.parametrize(
-    ("formulation", "normals"), AVERAGED + [(f, n) for f in ("continuous", "mortar") for n in ("facet", "averaged")]
-)
-def test_without_friction_only_the_load_counts(formulation, normals, forma04):
+FIELDS = [(f, {"normals": n}) for f in ("continuous", "mortar") for n in ("facet", "averaged")]
+OPTIONS = [("mortar", given) for given in ({"penalty": 1e6}, {"clearance": 0.1}, {"clearance": -0.1})]
+
+
+@pytest.mark.parametrize(("formulation", "options"), AVERAGED + FIELDS + OPTIONS, ids=str)
+def test_without_friction_only_the_load_counts(formulation, options, forma04):
     """The half-spheres, whose contact grows and shrinks."""
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(1.0, 6.0), radial_sizes=(1.0, 6.0))
-    steps = fc.solve(forma04(mesh, formulation, normals=normals), THERE_AND_BACK)
+    steps = fc.solve(forma04(mesh, formulation, **options), THERE_AND_BACK)
     same(steps[3], steps[1])
     same(steps[4], steps[0])
     same(steps[5], steps[1])
     assert steps[4].contact["hertz"].active.sum() < steps[2].contact["hertz"].active.sum()
-
-
-@pytest.mark.parametrize("options", [{"penalty": 1e6}, {"clearance": 0.1}, {"clearance": -0.1}], ids=str)
-def test_nor_does_the_path_with_options(options, forma04):
-    mesh = fc.generate.half_spheres("quad4", arc_sizes=(1.0, 6.0), radial_sizes=(1.0, 6.0))
-    steps = fc.solve(forma04(mesh, "mortar", **options), THERE_AND_BACK)
-    same(steps[4], steps[0])
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

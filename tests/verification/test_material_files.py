@@ -5,6 +5,7 @@ import meshio
 import numpy as np
 import pytest
 from case_texts import of_block
+from mechanics import in_space
 from refusals import refused
 
 import fastcontact as fc
@@ -25,8 +26,6 @@ def graded(places):
 
 def vtu(path, mesh, order=None, extra=None):
     """All solid cells, in another order where one is given; `extra` cells of a further block far away."""
-    points = np.zeros((mesh.n_points, 3))
-    points[:, : mesh.dim] = mesh.points
     ((kind, block),) = mesh.solids.items()
     block = block if order is None else block[order]
     values = graded(mesh.points[block].mean(axis=1))
@@ -34,7 +33,7 @@ def vtu(path, mesh, order=None, extra=None):
     meshio.write(
         path,
         meshio.Mesh(
-            points, [(elements.get(kind).meshio, block)], point_data=point_data,
+            in_space(mesh.points), [(elements.get(kind).meshio, block)], point_data=point_data,
             cell_data={"E": [values], "vectors": [np.ones((len(block), 3))], **(extra or {})},
         ),
     )  # fmt: skip
@@ -60,12 +59,11 @@ def med(path, mesh, instants=1, gauss=1):
 
 def vtkhdf(path, mesh):
     model = fc.Model(mesh, "plane_stress" if mesh.dim == 2 else "3d")
-    points = np.zeros((mesh.n_points, 3))
-    points[:, : mesh.dim] = mesh.points
     ((_, block),) = mesh.solids.items()
     with h5py.File(path, "w") as file:
         grid = file.create_group("VTKHDF")
-        grid["NumberOfPoints"], grid["NumberOfCells"], grid["Points"] = [mesh.n_points], [len(block)], points
+        grid["NumberOfPoints"], grid["NumberOfCells"] = [mesh.n_points], [len(block)]
+        grid["Points"] = in_space(mesh.points)
         grid["Connectivity"], grid["Offsets"] = block.ravel(), block.shape[1] * np.arange(len(block) + 1)
         grid["CellData/E"] = graded(mesh.points[block].mean(axis=1))
     assert model.n_dofs == mesh.points.size

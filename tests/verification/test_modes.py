@@ -41,6 +41,12 @@ def bar(element, kinematics, n=(1, 16), name="BAR", bottom=0.0, height=1.0):
     return fc.generate.renamed(mesh, lambda own: own if own == name else f"{name} {own}")
 
 
+def two_bars(n, height):
+    """Return a bar LOW with a bar UP on it, in the plane."""
+    low, up = (bar("quad8", "plane_strain", n, name, z, height) for name, z in (("LOW", 0.0), ("UP", height)))
+    return union(low, up)
+
+
 @pytest.mark.parametrize(
     ("kinematics", "element"),
     [(k, e) for k in ("plane_strain", "plane_stress", "axisymmetric") for e in FLAT] + [("3d", e) for e in SOLID],
@@ -200,10 +206,7 @@ def test_what_is_tied_or_sticks_vibrates_as_the_whole_body(kinematics, element, 
 
 
 def test_what_slides_is_free_along_the_surface_unless_it_is_held():
-    mesh = union(
-        bar("quad8", "plane_strain", (4, 4), "LOW", height=0.1), bar("quad8", "plane_strain", (4, 4), "UP", 0.1, 0.1)
-    )
-    found = {}
+    mesh, found = two_bars((4, 4), 0.1), {}
     for name, options in {"slides": {"friction": 0.05}, "tied": {"kind": "tied"}}.items():
         model = model_of(mesh, "plane_strain", **{"LOW BOTTOM": "xy", "UP TOP": {"x": 2e-4, "y": -2e-4}})
         model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options)
@@ -218,9 +221,7 @@ def test_what_slides_is_free_along_the_surface_unless_it_is_held():
 
 def test_a_warning_counts_modes_that_friction_would_hold():
     """A body that nothing but sliding friction holds along the joint; one that slides without friction has no remedy."""
-    mesh = union(
-        bar("quad8", "plane_strain", (4, 4), "LOW", height=0.1), bar("quad8", "plane_strain", (4, 4), "UP", 0.1, 0.1)
-    )
+    mesh = two_bars((4, 4), 0.1)
 
     def pressed(push: dict[str, float], **options: float) -> fc.Model:
         model = model_of(mesh, "plane_strain", **{"LOW BOTTOM": "xy"})
@@ -420,7 +421,7 @@ def test_what_is_open_is_free_and_penalties_are_springs():
     """Two bars of length 1 joined by a spring k: ``w cos w sin w = k (cos^2 w - sin^2 w)`` with w the angular frequency."""
     from scipy.optimize import brentq
 
-    mesh = union(bar("quad8", "plane_strain", (1, 8), "LOW"), bar("quad8", "plane_strain", (1, 8), "UP", 1.0))
+    mesh = two_bars((1, 8), 1.0)
     for options in FORMULATIONS:
         model = model_of(mesh, "plane_strain", **{"LOW BOTTOM": "xy"}, LOW={"x": 0.0}, UP={"x": 0.0})
         model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", penalty=1.5, **options)
@@ -447,10 +448,7 @@ def test_an_obstacle_holds_what_is_closed_and_moves_without_mass():
 
 
 def test_a_plate_that_a_force_moves_presses_on_a_bar_of_two_tied_halves():
-    halves = union(
-        bar("quad8", "plane_strain", (1, 8), "LOW", 0.0, 0.5), bar("quad8", "plane_strain", (1, 8), "UP", 0.5, 0.5)
-    )
-    model = model_of(halves, "plane_strain", **{"LOW BOTTOM": "xy"}, LOW={"x": 0.0}, UP={"x": 0.0})
+    model = model_of(two_bars((1, 8), 0.5), "plane_strain", **{"LOW BOTTOM": "xy"}, LOW={"x": 0.0}, UP={"x": 0.0})
     model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", kind="tied")
     plate = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
     model.add_obstacle("plate", secondary="UP TOP", obstacle=plate, force={"y": -0.01})

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from models import elastic_model, supported
 from pairwise import first_of
-from two_bodies import YOUNG, blocks, boxes, held, touching
+from two_bodies import YOUNG, blocks, boxes, each, held, touching
 
 import fastcontact as fc
 
@@ -188,11 +188,12 @@ def difference(one, other):
 
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_a_clearance_is_a_body_moved_away(formulation, kinematics, swap):
-    make = boxes if kinematics == "3d" else blocks
-    moved = touching(held(make(apart=0.005), kinematics, 0.025), formulation, swap)
-    clear = touching(held(make(), kinematics, 0.025), formulation, swap, clearance=0.005)
+@each
+def test_a_clearance_is_a_body_moved_away(formulation, options, kinematics, swap):
+    make, upper = (boxes, (3, 2, 2)) if kinematics == "3d" else (blocks, (4, 3))
+    sizes = {"upper": upper} if formulation == "mortar" else {}  # of meshes that do not match
+    moved = touching(held(make(apart=0.005, **sizes), kinematics, 0.025), formulation, swap, **options)
+    clear = touching(held(make(**sizes), kinematics, 0.025), formulation, swap, clearance=0.005, **options)
     one, other = (fc.solve(model, LAST)[-1] for model in (clear, moved))
     assert difference(one, other) < 1e-12
     assert one.contact["pair"].pressure == pytest.approx(other.contact["pair"].pressure, rel=1e-12)
@@ -209,13 +210,11 @@ def test_an_interference_presses_bodies_that_nothing_moves(formulation):
 
 
 @pytest.mark.parametrize("kinematics", ["plane_strain", "3d"])
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_clearances_of_both_sides_add_up(formulation, kinematics):
-    mesh = boxes() if kinematics == "3d" else blocks()
-    models = [
-        touching(held(mesh, kinematics), formulation, clearance=lambda x: 0.01 + 0 * x[:, 0], clearance_primary=-0.004),
-        touching(held(mesh, kinematics), formulation, clearance=0.006),
-    ]
+@each
+def test_clearances_of_both_sides_add_up(formulation, options, kinematics):
+    mesh, both = boxes() if kinematics == "3d" else blocks(), {"clearance": lambda x: 0.01 + 0 * x[:, 0]}
+    both["clearance_primary"] = -0.004
+    models = [touching(held(mesh, kinematics), formulation, **own, **options) for own in (both, {"clearance": 0.006})]
     assert difference(*(fc.solve(model, LAST)[-1] for model in models)) < 1e-12
 
 
@@ -265,8 +264,6 @@ def test_an_obstacle_may_stand_off(formulation):
     assert forces[1] == pytest.approx(1000.0 / 0.91 * 0.016 / 5.0 * 10.0, rel=1e-12)
 
 
-EVERY = [("node_to_segment", {}), ("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
-each = pytest.mark.parametrize(("formulation", "options"), EVERY, ids=["node", "continuous", "mortar", "dual"])
 PRESS, STIFFNESS, MU = 0.05, 300.0, 0.3
 # Pressed in the first step, then pushed sideways: 1 at the instant 3, back to 0 at 5.
 SIDEWAYS = [(0.0, 0.0), (1.0, 0.0), (3.0, 1.0), (5.0, 0.0)]

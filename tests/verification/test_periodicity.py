@@ -6,6 +6,7 @@ from images import Image, image_of
 from models import elastic_model, made_of, supported
 from pairwise import first_of
 from refusals import refused
+from two_bodies import arcs
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box, merge_points, renamed, union
@@ -80,23 +81,6 @@ def test_a_sector_is_a_part_of_the_whole_ring(sectors, swapped):
     scale = np.abs(together.displacement).max()
     assert alone.displacement[place] == pytest.approx(together.displacement[first], abs=1e-9 * scale)
     assert np.abs(alone.displacement).max() > 1e-3
-
-
-@pytest.mark.parametrize(("element", "error"), [("quad4", 1e-2), ("quad8", 1e-4)])
-def test_a_sector_under_pressure_moves_as_lame_says(element, error):
-    """With the sector's nodes on curved ends, tied alone: nothing else makes it a ring."""
-    model = ring(sector(7, (6, 12), element))
-    model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=7)
-    model.add_pressure("BOTTOM", 10.0)
-    nodes = model.mesh.points_of("BOTTOM")
-    tangent = np.column_stack([-model.mesh.points[nodes[0], 1], model.mesh.points[nodes[0], 0]])[0]
-    model.relate([(int(nodes[0]), "x", float(tangent[0])), (int(nodes[0]), "y", float(tangent[1]))])
-    step = fc.solve(model, 1)[-1]
-    radius = np.linalg.norm(model.mesh.points, axis=1)
-    pushed = np.einsum("nd,nd->n", step.displacement, model.mesh.points) / radius
-    k = 10.0 * INNER**2 / (OUTER**2 - INNER**2)
-    lame = (1.0 + NU) / E * k * ((1.0 - 2.0 * NU) * radius + OUTER**2 / radius)
-    assert np.abs(pushed / lame - 1.0).max() < error
 
 
 def test_sectors_of_a_press_fit_press_as_lame_says():
@@ -263,13 +247,7 @@ def test_a_closed_node_that_slides_past_the_end_has_the_gap_of_its_twin(formulat
 
 def fitted(sectors, cells, element, **options):
     """A sector of two rings with an interference."""
-    angle, parts = 2.0 * np.pi / sectors, []
-    for name, inside, count in (("A", 1.0, cells[0]), ("B", 2.0, cells[1])):
-        mesh = block((1.0, 1.0), (4, count), element)
-        r, t = inside + mesh.points[:, 0], angle * mesh.points[:, 1]
-        mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)]))
-        parts.append(renamed(mesh, {group: name + group for group in mesh.group_names}))
-    model = ring(union(*parts))
+    model = ring(arcs(element, [(4, count) for count in cells], 2.0 * np.pi / sectors))
     for name in "AB":
         model.fix(f"{name}BOTTOM", "y")
         model.add_cyclic_symmetry(f"{name}BOTTOM", f"{name}TOP", sectors=sectors)

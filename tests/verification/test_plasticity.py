@@ -223,16 +223,20 @@ def test_a_reused_tangent_with_which_contact_does_not_converge_is_replaced():
     assert last.force == pytest.approx(other.force, rel=1e-6)
 
 
+def punched(kinematics: str) -> fc.Model:
+    """Return an elastic-plastic block into which a flat punch is pressed."""
+    mesh = fc.generate.punched_block("quad8", punch_radius=1.0, extent=13.0, edge_size=0.2)
+    law = fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=300.0)
+    model = made_of(mesh, kinematics, law, SYMMETRY_X="x", BOTTOM="xy")
+    model.add_obstacle("punch", secondary="TOP", obstacle=fc.obstacles.FlatPunch(1.0), motion={"y": -0.1})
+    return model
+
+
 @pytest.mark.filterwarnings("ignore:the largest plastic strain", "ignore:.*overshoot near the edge")
 @pytest.mark.filterwarnings("ignore:rotations of up to")
 def test_a_flat_punch_whose_edge_lies_on_a_node():
     """The node at the edge alternates: loaded it moves outward past the edge, unloaded it returns. The load is Prandtl's."""
-    mesh = fc.generate.punched_block("quad8", punch_radius=1.0, extent=13.0, edge_size=0.2)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=300.0))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("BOTTOM", "xy")
-    model.add_obstacle("punch", secondary="TOP", obstacle=fc.obstacles.FlatPunch(1.0), motion={"y": -0.1})
+    model = punched("plane_strain")
     with pytest.raises(fc.ConvergenceError, match=r"Criteria\(keep_pairing=True\), since nodes move past the edge"):
         fc.solve(model, 4, criteria=fc.Criteria(max_geometry_updates=15))
     last = fc.solve(model, 4, criteria=fc.Criteria(keep_pairing=True))[-1]
@@ -245,11 +249,7 @@ def test_a_flat_punch_whose_edge_lies_on_a_node():
 @pytest.mark.filterwarnings("ignore:rotations of up to", "ignore:the energy of these load steps is out of balance")
 def test_a_surface_that_flows_past_the_edge_of_a_punch_is_told():
     """The force is 17 % smaller than that of the same area in contact; the warning estimates 16 %."""
-    model = fc.Model(fc.generate.punched_block("quad8", punch_radius=1.0, extent=13.0, edge_size=0.2), "axisymmetric")
-    model.add_material(fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=300.0))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("BOTTOM", "xy")
-    model.add_obstacle("punch", secondary="TOP", obstacle=fc.obstacles.FlatPunch(1.0), motion={"y": -0.1})
+    model = punched("axisymmetric")
     with pytest.warns(fc.FastcontactWarning, match="past the edge of the obstacle. 15.5%.*keep_pairing"):
         lost = fc.solve(model, 4)[-1].contact["punch"].force[1]
     kept = fc.solve(model, 4, criteria=fc.Criteria(keep_pairing=True))[-1]

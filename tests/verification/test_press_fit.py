@@ -6,10 +6,9 @@ import warnings
 import numpy as np
 import pytest
 from models import elastic_model, made_of, supported, united
-from two_bodies import rings
+from two_bodies import arcs, rings
 
 import fastcontact as fc
-from fastcontact.mesh.generate import renamed, union
 
 pytestmark = pytest.mark.each_value
 
@@ -197,13 +196,8 @@ def test_a_strip_one_facet_wide_is_smoothed_as_one_two_facets_wide(element, pres
     """A slice of two rings: facets alone are open, the force on smooth surfaces is within 2 % of Lame's."""
     width, found = 0.2, []
     for across in (1, 2):
-        parts = []
-        for name, inside, facets in (("A", 1.0, 5), ("B", 2.0, 7)):
-            mesh = fc.generate.box((1.0, 1.0, width), (4, facets, across), element, name=name)
-            r, t, z = inside + mesh.points[:, 0], np.pi / 3.0 * mesh.points[:, 1], mesh.points[:, 2]
-            mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), z]))
-            parts.append(renamed(mesh, {group: name + group for group in mesh.group_names if group != name}))
-        model = made_of(union(*parts), "3d", SHAFT)
+        mesh = arcs(element, [(4, facets, across) for facets in (5, 7)], np.pi / 3.0, height=width)
+        model = made_of(mesh, "3d", SHAFT)
         for name in "AB":
             supported(model, **{f"{name}YMIN": "y", f"{name}YMAX": "normal", f"{name}ZMIN": "z", f"{name}ZMAX": "z"})
         sides = ("BXMIN", "AXMAX") if swap else ("AXMAX", "BXMIN")
@@ -224,13 +218,7 @@ def test_a_strip_one_facet_wide_is_smoothed_as_one_two_facets_wide(element, pres
 ])  # fmt: skip
 def test_friction_between_planes_of_symmetry_has_no_shear(options, element, count, most):
     """Closing is no slip: normals lean at the ends, where facets end, and clearances close along them."""
-    angle, parts = np.pi / 4.0, []
-    for name, inside in (("A", 1.0), ("B", 2.0)):
-        mesh = fc.generate.block((1.0, 1.0), (count, count), element, name=name)
-        r, t = inside + mesh.points[:, 0], angle * mesh.points[:, 1]
-        mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)]))
-        parts.append(renamed(mesh, {group: name + group for group in mesh.group_names if group != name}))
-    model = made_of(union(*parts), "plane_strain", SHAFT)
+    model = made_of(arcs(element, [(count, count)] * 2, np.pi / 4.0), "plane_strain", SHAFT)
     for name in "AB":
         supported(model, **{f"{name}BOTTOM": "y", f"{name}TOP": "normal"})
     sides = {"secondary": "ARIGHT", "primary": "BLEFT"}

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from models import made_of, supported
 from refusals import refused
-from two_bodies import rings
 
 import fastcontact as fc
 
@@ -104,23 +103,6 @@ def test_a_held_body_is_pressed_by_its_expansion(element):
             np.testing.assert_allclose(step.stress[:, :3], -factor * pressure, rtol=1e-9)
             push = step.reaction[model.mesh.points_of("LEFT"), 0].sum()
             assert push == pytest.approx(factor * pressure, rel=1e-9)
-
-
-def test_a_heated_shaft_in_a_hub():
-    """A shrink fit by heat: the pressure of Lame for the interference (1 + nu) alpha T R of plane strain."""
-    mesh = rings("quad8", inner=(1.0, 2.0), divisions=((18, 6), (18, 6)))
-    shaft, hub = (fc.LinearElastic(E, nu, expansion=ALPHA) for E, nu in ((1000.0, 0.3), (500.0, 0.25)))
-    model = made_of(mesh, "plane_strain", {"SHAFT": shaft, "HUB": hub}, XAXIS="y", YAXIS="x")
-    model.add_contact("fit", secondary="HUB_INNER", primary="SHAFT_OUTER", formulation="mortar")
-    model.add_temperature(RISE, "SHAFT")
-    last = solved(model)
-    lame = fc.analytic.press_fit_cylinders(
-        E_inner=1000.0, nu_inner=0.3, E_outer=500.0, nu_outer=0.25, inner_radius=1.0, interface_radius=2.0,
-        outer_radius=3.0, interference=1.3 * ALPHA * RISE * 2.0,
-    )  # fmt: skip
-    assert last.contact["fit"].pressure.mean() == pytest.approx(lame.pressure, rel=1e-4)
-    rim = np.linalg.norm(last.displacement[mesh.points_of("HUB_OUTER")], axis=1).mean()
-    assert rim == pytest.approx(float(lame.outer.displacement(3.0)), rel=1e-4)
 
 
 def test_a_bimetal_strip():

@@ -5,6 +5,7 @@ import meshio
 import numpy as np
 import pytest
 from case_texts import of_block
+from mechanics import in_space
 from refusals import refused
 from test_temperature import ALPHA, E, free, plane
 
@@ -35,20 +36,16 @@ def med(path, mesh, values, times=(0.0,), components=("TEMP",)):
 def vtu(path, mesh, values, order=None, name="TEMP"):
     order = np.arange(mesh.n_points) if order is None else order
     back = np.argsort(order)
-    points = np.zeros((mesh.n_points, 3))
-    points[:, : mesh.dim] = mesh.points
     cells = [(elements.get(kind).meshio, back[block]) for kind, block in mesh.solids.items()]
-    meshio.write(path, meshio.Mesh(points[order], cells, point_data={name: np.asarray(values)[order]}))
+    meshio.write(path, meshio.Mesh(in_space(mesh.points)[order], cells, point_data={name: np.asarray(values)[order]}))
     return path
 
 
 def vtkhdf(path, mesh, values, times):
     """As VTK lays out data that change with time on a mesh that does not."""
-    points = np.zeros((mesh.n_points, 3))
-    points[:, : mesh.dim] = mesh.points
     with h5py.File(path, "w") as file:
         grid = file.create_group("VTKHDF")
-        grid["NumberOfPoints"], grid["Points"] = [mesh.n_points], points
+        grid["NumberOfPoints"], grid["Points"] = [mesh.n_points], in_space(mesh.points)
         grid["PointData/TEMP"] = np.concatenate(values)
         grid["Steps/Values"] = times
         grid["Steps/PointDataOffsets/TEMP"] = mesh.n_points * np.arange(len(times))

@@ -5,14 +5,12 @@ import pytest
 from mechanics import contact_forces
 from models import elastic_model
 from refusals import refused
-from two_bodies import SIDES, YOUNG, blocks, boxes, held, ring, touching
+from two_bodies import SIDES, YOUNG, blocks, boxes, each, held, ring, touching
 
 import fastcontact as fc
 
 pytestmark = pytest.mark.each_value
 
-EVERY = [("node_to_segment", {}), ("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
-each = pytest.mark.parametrize(("formulation", "options"), EVERY, ids=["node", "continuous", "mortar", "dual"])
 both = pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
 
 
@@ -167,18 +165,6 @@ def test_both_sides_carry_opposite_forces_and_all_nodes_are_in_balance(formulati
         sides = (contact.points, contact.force_vectors), (contact.primary_points, contact.primary_force_vectors)
         moments = [moment(model.mesh.points[points], forces) for points, forces in sides]
         np.testing.assert_allclose(moments[0], -moments[1], atol=1e-9 * size * 10.0)
-
-
-@pytest.mark.parametrize("kinematics", ["plane_strain", "3d"])
-def test_result_files_keep_the_forces_of_both_sides(tmp_path, kinematics):
-    mesh = boxes() if kinematics == "3d" else blocks(lower=(5, 2))
-    model = touching(held(mesh, kinematics), "mortar")
-    with fc.ResultWriter(tmp_path / "a.vtkhdf", model) as out:
-        steps = fc.solve(model, fc.linear_ramp(3), on_step=out.write)
-    for kept, step in zip(fc.open_results(tmp_path / "a.vtkhdf"), steps, strict=True):
-        one, other = kept.contact["pair"], step.contact["pair"]
-        np.testing.assert_array_equal(one.primary_points, other.primary_points)
-        np.testing.assert_array_equal(one.primary_force_vectors, other.primary_force_vectors)
 
 
 # Nodes opposite nodes

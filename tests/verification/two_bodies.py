@@ -1,12 +1,15 @@
 """Pairs of small bodies for tests of contact options: blocks, boxes, rings."""
 
 import numpy as np
+import pytest
 from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box, renamed, union
 
 YOUNG, POISSON = 1000.0, 0.3
+EVERY = [("node_to_segment", {}), ("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
+each = pytest.mark.parametrize(("formulation", "options"), EVERY, ids=["node", "continuous", "mortar", "dual"])
 SIDES = {"plane": ("CONT_UPPER", "CONT_LOWER"), "space": ("U_ZMIN", "L_ZMAX")}
 
 
@@ -56,3 +59,17 @@ def ring(element, inner, outer, divisions, name):
 def rings(element, inner=(1.0, 2.0), outer=(2.0, 3.0), divisions=((6, 3), (6, 3))):
     """Two quarters of rings around each other, SHAFT and HUB."""
     return union(ring(element, *inner, divisions[0], "SHAFT"), ring(element, *outer, divisions[1], "HUB"))
+
+
+def arcs(element, cells, angle, start=0.0, height=0.2):
+    """Sectors of two rings, A from the radius 1 to 2 and B from 2 to 3, of cells (across, along) or (across, along, up).
+
+    Groups are those of `block` or `box` after A or B: x becomes the radius, y the angle.
+    """
+    parts = {}
+    for name, inside, divisions in zip("AB", (1.0, 2.0), cells, strict=True):
+        make, size = (block, (1.0, 1.0)) if len(divisions) == 2 else (box, (1.0, 1.0, height))
+        mesh = make(size, divisions, element)
+        r, t = inside + mesh.points[:, 0], start + angle * mesh.points[:, 1]
+        parts[name] = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), mesh.points[:, 2:]]))
+    return united(**parts)

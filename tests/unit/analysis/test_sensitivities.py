@@ -301,15 +301,18 @@ def test_constants_along_the_axes_of_a_material(dim):
     compare(make, [("contact_force", "c", "xyz"[dim - 1])], changes)
 
 
+def bolt(**constants):
+    """Return a bar between walls that is cut in its middle."""
+    bar = fc.generate.block((1.0, 2.0), (2, 4))
+    bar = bar.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True)
+    return elastic_model(fc.generate.cut(bar, "CUT"), "plane_stress", BOTTOM="xy", TOP="xy", **constants)
+
+
 @pytest.mark.parametrize("given", ["force", "shortening"])
 def test_pretension(given):
-    mesh = fc.generate.block((1.0, 2.0), (2, 4)).with_facet_group(
-        "CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True
-    )
-    mesh = fc.generate.cut(mesh, "CUT")
 
     def make(E=1000.0, pulled=1.0, pushed=1.0):
-        model = elastic_model(mesh, "plane_stress", E=E, BOTTOM="xy", TOP="xy")
+        model = bolt(E=E)
         model.add_pretension("bolt", "CUT", **{given: {"force": 3.0, "shortening": 0.01}[given] * pulled})
         model.add_pressure("RIGHT", pushed)
         return model
@@ -429,13 +432,10 @@ def test_the_value_of_a_result_file_is_enough(tmp_path):
 
 
 def test_bolts_before_and_after_their_lock():
-    mesh = fc.generate.block((1.0, 2.0), (2, 4)).with_facet_group(
-        "CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True
-    )
-    mesh = fc.generate.cut(mesh, "CUT")
-    model = elastic_model(mesh, "plane_stress", nu=0.0, BOTTOM="xy", TOP="xy")
+    model = bolt(nu=0.0)
     model.add_pretension("bolt", "CUT", force=3.0, locked_from=1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
-    point = int(np.argmax(mesh.points[:, 1] * (mesh.points[:, 1] < 0.6)))  # half a length from the bottom
+    height = model.mesh.points[:, 1]
+    point = int(np.argmax(height * (height < 0.6)))  # half a length from the bottom
     first = fc.solve(model, [1.0])[-1]
     found = fc.sensitivities(model, first, ("displacement", point, "y"), [("E", 0)], ramp=[1.0, 2.0])
     assert found.derivatives["E", 0] == pytest.approx(-3.0 * 0.5 / 1000.0**2, rel=1e-9)

@@ -237,14 +237,6 @@ def test_a_file_whose_case_is_no_toml_is_shown_without_theory(solved, tmp_path, 
     assert "theory" not in output_of(capsys, ["profile", str(path)])
 
 
-def test_a_reader_that_goes_away_is_no_error_of_ours(monkeypatch):
-    def gone(*_, **__):
-        raise BrokenPipeError
-
-    monkeypatch.setattr("builtins.print", gone)
-    assert main(["env"]) == 1
-
-
 def test_steps_and_pairs_that_do_not_exist(solved, capsys):
     assert "steps 1 to 3" in output_of(capsys, ["profile", str(solved / "small.vtkhdf"), "--step", "9"], 1)
     assert "'hertz'" in output_of(capsys, ["profile", str(solved / "small.vtkhdf"), "--contact", "herz"], 1)

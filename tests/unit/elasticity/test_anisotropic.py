@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import FLAT, elastic_model
 from refusals import refused
-from test_assembly import FLAT, MESHES, plane_patch, twin
+from test_assembly import MESHES, plane_patch, twin
 
 import fastcontact as fc
 from fastcontact.elasticity.material_axes import PAIRS

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import CELLS, SOLIDS, elastic_model
 from refusals import refused
 
 import fastcontact as fc
@@ -13,7 +13,6 @@ from fastcontact.mesh.topology import corner_measures, oriented, outer_facets
 
 pytestmark = pytest.mark.pairwise
 
-SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]
 QUADRATIC = [name for name in SOLIDS if elements.get(name).order == 2]
 E, NU = 210.0, 0.3
 # Displacement gradient of a linear field without symmetry, and its strain.
@@ -77,11 +76,7 @@ def mixed():
 MESHES = {name: lambda name=name: patch(name) for name in SOLIDS}
 MESHES["mixed linear"] = lambda: distorted(mixed())
 MESHES["mixed quadratic"] = lambda: distorted(fc.generate.to_quadratic(mixed()))
-FLAT = [e.name for e in elements.ELEMENTS.values() if e.dim == 2]
-EVERY = [
-    *((kinematics, name) for kinematics in ("plane_strain", "plane_stress", "axisymmetric") for name in FLAT),
-    *(("3d", name) for name in MESHES),
-]
+EVERY = [*CELLS, *(("3d", name) for name in MESHES if name not in SOLIDS)]
 
 
 @pytest.fixture(params=EVERY, ids="-".join, scope="module")
@@ -218,18 +213,6 @@ def test_internal_forces_are_stiffness_times_displacement(body):
     u = np.random.default_rng(2).normal(size=mesh.points.shape)
     force = fc.recovery.internal_force(mesh, kinematics, stress_at_points(kinematics, mesh, u))
     assert np.abs(force.ravel() - assembled(mesh, kinematics) @ u.ravel()).max() < 1e-12 * np.abs(force).max()
-
-
-def test_each_cell_has_its_own_material():
-    mesh = patch("hex8", (2, 1, 1))
-    other = fc.LinearElastic(2 * E, -0.2).moduli("3d")
-    first, second = (
-        stiffness(mesh.replace(cells={"hex8": mesh.cells["hex8"][[i]]}, cell_groups={}), "3d", own[None],
-                  {"hex8": np.zeros(1, np.int32)}).toarray()
-        for i, own in enumerate((D, other))
-    )  # fmt: skip
-    both = stiffness(mesh, "3d", np.stack([other, D]), {"hex8": np.array([1, 0], np.int32)}).toarray()
-    assert np.abs(both - first - second).max() < 1e-12 * np.abs(both).max()
 
 
 @pytest.mark.parametrize("element", SOLIDS)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import made_of, supported
+from models import CELLS, made_of, supported
 
 import fastcontact as fc
 from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
@@ -26,14 +26,6 @@ LAWS = {
     "Yeoh": (fc.Yeoh(20.0, 3.0, 1.0, bulk=100.0), "finite"),
     "Ogden": (fc.Ogden([20.0, 5.0], [1.7, -2.3], bulk=100.0), "finite"),
 }
-FLAT = ["tri3", "tri6", "quad4", "quad8", "quad9"]
-SOLID = [
-    "tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13",
-]  # fmt: skip
-CELLS = [
-    *((kinematics, element) for kinematics in ("plane_strain", "plane_stress", "axisymmetric") for element in FLAT),
-    *(("3d", element) for element in SOLID),
-]
 
 
 def single(element: str, kinematics: str, law, strain: str):

@@ -162,22 +162,6 @@ def test_one_line_says_which_nodes_are_held(caplog):
     assert not caplog.records
 
 
-def test_a_disc_under_pressure_on_its_rim_is_lame():
-    """Without a hole the radial displacement is linear: u = -p r (1 - nu) / E under plane stress."""
-    model = cylinder()
-    model.add_pressure("RIGHT", 10.0)
-    (step,) = fc.solve(model, fc.linear_ramp(1))
-    radius = model.mesh.points[:, 0]
-    assert step.displacement[:, 0] == pytest.approx(-10.0 * radius * 0.7 / 1000.0, abs=1e-12)
-
-
-def test_a_hole_opens_under_pressure():
-    model = cylinder(inner=0.1)
-    model.add_pressure("LEFT", 10.0)
-    (step,) = fc.solve(model, fc.linear_ramp(1))
-    assert (step.displacement[model.mesh.points_of("LEFT"), 0] > 0.0).all()
-
-
 def test_nodes_of_single_precision_are_on_the_axis_and_others_not():
     points = cylinder().mesh.points.copy()
     left = cylinder().mesh.points_of("LEFT")
@@ -285,11 +269,6 @@ def test_functions_that_fail_are_told_apart_by_their_names():
 
     assert differing_parts(parts(pressure=wrong), parts(pressure=wrong)) == []
     assert differing_parts(parts(pressure=wrong), parts(pressure=other)) == ["the loads"]
-
-
-def test_a_piecewise_linear_table_is_interpolated():
-    ramp = fc.Ramp((0.5, 1.0, 1.5), ((0, 0), (1, 2), (2, 0)))
-    assert [ramp.value(t) for t in ramp.instants] == [1.0, 2.0, 1.0]
 
 
 @pytest.mark.parametrize(

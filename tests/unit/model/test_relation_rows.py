@@ -32,10 +32,6 @@ def block(dim, element=None):
     return body_of(element or ("quad4" if dim == 2 else "hex8"), (2.0, 3.0, 1.0), (2, 3, 1))
 
 
-def model_of(mesh, **held):
-    return elastic_model(mesh, E=E, nu=NU, **held)
-
-
 def last(model, **options):
     return fc.solve(model, fc.linear_ramp(2), **options)[-1]
 
@@ -45,7 +41,14 @@ def pair_of(element):
     dim = 2 if element.startswith(("tri", "quad")) else 3
     held = {"XMIN": "x", "YMIN": "y", "ZMIN": "z"} if dim == 3 else {"LEFT": "x", "BOTTOM": "y"}
     mesh, Q = block(dim, element), turn(dim)
-    return dim, Q, held, "ZMAX" if dim == 3 else "TOP", model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
+    return (
+        dim,
+        Q,
+        held,
+        "ZMAX" if dim == 3 else "TOP",
+        elastic_model(mesh),
+        elastic_model(mesh.replace(points=mesh.points @ Q.T)),
+    )
 
 
 @pytest.mark.parametrize(
@@ -81,7 +84,7 @@ def test_contact_between_turned_bodies_is_the_same(formulation, solver):
     mesh, Q = fc.generate.block_on_block(divisions_lower=(5, 3), divisions_upper=(4, 3)), turn(2)
     found = []
     for turned in (False, True):
-        model = model_of(mesh.replace(points=mesh.points @ Q.T) if turned else mesh)
+        model = elastic_model(mesh.replace(points=mesh.points @ Q.T) if turned else mesh)
         for group, axis in {"LOWER_LEFT": "x", "UPPER_LEFT": "x", "LOWER_BOTTOM": "y"}.items():
             model.fix(group, "normal" if turned else axis)
         model.prescribe("UPPER_TOP", ramp=[(0, 0), (0.5, 1), (1, 0.5)], **{"normal" if turned else "y": -0.05})
@@ -101,7 +104,7 @@ def test_a_smooth_mandrel_holds_a_ring_and_lame_tells_the_pressure():
         square = fc.generate.block((1.0, 1.0), (n, n // 2), "quad8")
         angle, radius = 0.5 * np.pi * (1 - square.points[:, 0]), 1.0 + square.points[:, 1]
         mesh = square.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
-        model = model_of(mesh, BOTTOM="normal", LEFT="x", RIGHT="y")
+        model = elastic_model(mesh, BOTTOM="normal", LEFT="x", RIGHT="y")
         model.add_pressure("TOP", 2.0)
         step = last(model)
         inside = mesh.points_of("BOTTOM")
@@ -120,7 +123,7 @@ def test_a_smooth_mandrel_holds_a_ring_and_lame_tells_the_pressure():
 
 def test_nodes_coupled_along_normals_move_by_the_same():
     mesh, Q = block(2), turn(2)
-    axes, turned = model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
+    axes, turned = elastic_model(mesh), elastic_model(mesh.replace(points=mesh.points @ Q.T))
     for group, axis in {"LEFT": "x", "BOTTOM": "y"}.items():
         axes.fix(group, axis)
         turned.fix(group, "normal")
@@ -136,7 +139,7 @@ def test_nodes_coupled_along_normals_move_by_the_same():
 def test_a_part_that_repeats_itself_keeps_its_ends_together(dim):
     """Ends that move together leave no strain across: uniaxial strain, though nothing else holds the ends."""
     mesh = block(dim, "quad8" if dim == 2 else "hex8")
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     low, high = ("LEFT", "RIGHT") if dim == 2 else ("XMIN", "XMAX")
     model.relate_groups(low, high, "xyz"[:dim])
     bottom, top = ("BOTTOM", "TOP") if dim == 2 else ("YMIN", "YMAX")
@@ -151,7 +154,7 @@ def test_a_part_that_repeats_itself_keeps_its_ends_together(dim):
 
 def test_ends_may_be_strained_by_a_value():
     mesh = block(2)
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.relate_groups("RIGHT", "LEFT", "x", value=0.02)
     supported(model, BOTTOM="y", BOTTOM_LEFT="x")
     step = last(model)
@@ -161,7 +164,7 @@ def test_ends_may_be_strained_by_a_value():
 def test_groups_are_related_along_their_normals():
     """Opposite faces of a block squeezed by equal amounts: their displacements out of the body are equal."""
     mesh = block(2)
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.relate_groups("BOTTOM", "TOP", "normal")
     model.couple("TOP", "y")
     model.fix("LEFT", "x")
@@ -173,14 +176,14 @@ def test_groups_are_related_along_their_normals():
 
 
 def test_a_support_that_contradicts_a_normal_one_is_told():
-    model = model_of(block(2), LEFT="x", BOTTOM="y")
+    model = elastic_model(block(2), LEFT="x", BOTTOM="y")
     model.prescribe("BOTTOM", normal=0.1)
     refused(fc.ModelError, "the displacement normal prescribed on 'BOTTOM' contradicts the supports", last, model)
 
 
 # ----------------------------------------------------------------------------- supports along axes
 def test_a_cosine_that_is_round_off_contradicts_no_support():
-    model = model_of(block(2))
+    model = elastic_model(block(2))
     c, s = np.cos(np.pi / 2), np.sin(np.pi / 2)
     model.fix("LEFT", "x", axes=(c, s))
     supported(model, BOTTOM="y", TOP={"x": 0.1 * s, "y": -0.1 * c})
@@ -192,7 +195,7 @@ def test_a_ring_held_round_about_is_lames():
     mesh = fc.generate.block((1.0, 1.0), (6, 8), "quad8")
     radius, angle = 1.0 + mesh.points[:, 0], 0.3 + 0.9 * mesh.points[:, 1]
     mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
-    model, round_about = model_of(mesh), fc.CylindricalAxes()
+    model, round_about = elastic_model(mesh), fc.CylindricalAxes()
     model.fix("BOTTOM", "y", axes=round_about)
     model.fix("TOP", "y", axes=round_about)
     model.prescribe("LEFT", x=0.01, axes=round_about)

@@ -28,11 +28,6 @@ from fastcontact.results import committed_file, journal, layout, write_arrays
 from fastcontact.results.committed_file import uninterrupted
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "run.vtkhdf"
-
-
 def failing_after(count: int, error: BaseException, monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
     """Let every call of a method of the file fail after the first `count`; the list tells how many were made."""
     method, calls = getattr(committed_file.CommittedFile, name), []
@@ -394,24 +389,26 @@ def test_the_same_data_hashed_for_ever(sound, tmp_path):
     assert len(fc.open_results(with_journal(sound, tmp_path, record(0, size, True, digest)))) == 2
 
 
-def test_a_journal_of_gigabytes(sound, tmp_path):
-    """A sparse file: nothing of it is read."""
-    path = tmp_path / "large.vtkhdf"
+def grown(sound, folder, size, length):
+    """A copy of this size, which says that a journal of a length is at its end."""
+    path = folder / "grown.vtkhdf"
     shutil.copy(sound, path)
     with path.open("r+b") as file:
-        file.truncate(1 << 36)
+        file.truncate(size)
         file.seek(0, os.SEEK_END)
-        file.write(journal.FOOTER.pack((1 << 36) - 1000, b"\0" * 32, journal.MAGIC))
+        file.write(journal.FOOTER.pack(length, b"\0" * 32, journal.MAGIC))
+    return path
+
+
+def test_a_journal_of_gigabytes(sound, tmp_path):
+    """A sparse file: nothing of it is read."""
+    path = grown(sound, tmp_path, 1 << 36, (1 << 36) - 1000)
     refused(fc.FileError, r"declares 6.87e\+10 bytes", fc.open_results, path)
 
 
 def test_a_long_journal_that_is_none_takes_no_memory(sound, tmp_path):
-    path, length = tmp_path / "long.vtkhdf", 1 << 27
-    shutil.copy(sound, path)
-    with path.open("r+b") as file:
-        file.truncate(2 * length)
-        file.seek(0, os.SEEK_END)
-        file.write(journal.FOOTER.pack(length, b"\0" * 32, journal.MAGIC))
+    length = 1 << 27
+    path = grown(sound, tmp_path, 2 * length, length)
     tracemalloc.start()
     try:
         assert len(fc.open_results(path)) == 2

@@ -30,11 +30,6 @@ def missing(names: list[str], last: int) -> set[int]:
     return set(range(1, last + 1)) - set(map(version, names))
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "run.vtkhdf"
-
-
 @pytest.fixture(params=FILES)
 def old(request: pytest.FixtureRequest, path: Path) -> tuple[Path, dict, int]:
     """A file, what its version had in memory when it wrote it, and the number of that version."""

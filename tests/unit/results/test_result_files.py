@@ -86,6 +86,8 @@ def contact_result(number: int, name: str, formulation: str, mesh: fc.Mesh = MES
         radius=(float(number), np.nan),
         slip=vectors(random, m, dim),
         slip_total=vectors(random, m, dim),
+        primary_points=random.permutation(mesh.n_points)[: m // 2].astype(np.int32),
+        primary_force_vectors=vectors(random, m // 2, dim),
     )
 
 
@@ -142,11 +144,6 @@ def write(path: Path, n_steps: int = 3, mesh: fc.Mesh = MESH) -> Path:
         for number in range(n_steps):
             out.write(step_result(number, mesh))
     return path
-
-
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "result.vtkhdf"
 
 
 # ---------------------------------------------------------------------------------------------- round trip

@@ -19,11 +19,6 @@ from fastcontact.results import committed_file, reader, write_arrays, writer
 from fastcontact.results.committed_file import CommittedFile
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "run.vtkhdf"
-
-
 def spheres(E: float = 20_000.0, friction: float = 0.0, arc: float = 3.0) -> fc.Model:
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(arc, 6.0), segments=3)
     model = fc.Model(mesh, "axisymmetric", case_text="first")

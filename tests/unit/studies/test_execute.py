@@ -213,11 +213,6 @@ def test_a_limit_known_well_is_told_with_more_digits():
     assert percent(0.0400513, 1e-6) == "+4.0051 %"
 
 
-@pytest.fixture(scope="module")
-def case(root):
-    return root / "data/cases/forma04c.toml"
-
-
 @pytest.mark.slow
 def test_a_dask_scheduler_by_its_address(case, tmp_path):
     """One value on one worker; `docs/howto/cluster.md` holds the bits of several against those of processes here."""

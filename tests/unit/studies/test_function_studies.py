@@ -184,11 +184,6 @@ def test_sizes_that_are_numbers_of_cells_are_told():
         fc.convergence_study(lambda n: tube(1 / n), [2, 4, 8], quantities={"bore": bore})
 
 
-@pytest.fixture(scope="module")
-def case(root):
-    return root / "data/cases/forma04c.toml"
-
-
 ADAPTED = [
     ("forma04c", "quad8", "continuous", 8_000),
     ("forma04b", "tri6", "continuous", 8_000),

@@ -15,11 +15,6 @@ from fastcontact.studies.sweep_report import parameter_label
 
 
 @pytest.fixture(scope="module")
-def case(root):
-    return root / "data/cases/forma04c.toml"
-
-
-@pytest.fixture(scope="module")
 def sweep(case):
     return fc.parameter_sweep(case, {"approach": (0.004, 0.04, 0.4, 4.0)}, level=2, workers=1)
 

@@ -123,12 +123,8 @@ def test_loads_stay_change_and_go_over_steps(tmp_path):
 
 
 def test_a_conductance_by_clearance(tmp_path):
-    apart = two_bars().replace("0.1\n1", "0.1\n1")
-    table = "*GAP CONDUCTANCE\n1000., 0.\n0., 2.E-3\n"
-    text = apart + MATERIALS + CONTACT.replace("*GAP CONDUCTANCE\n1000.\n", table)
-    text += "*CLEARANCE, SLAVE=UB, MASTER=LT, VALUE=1.E-3\n" + ENDS + STEP.format("")
-    deck = deck_of(tmp_path, text)
-    (step,) = deck.solve()
+    table = CONTACT.replace("1000.\n", "1000., 0.\n0., 2.E-3\n")
+    deck, (step,) = solved(tmp_path, between=table + "*CLEARANCE, SLAVE=UB, MASTER=LT, VALUE=1.E-3\n")
     flux = 100.0 / (LENGTH / 50.0 + 1.0 / 500.0 + LENGTH / 20.0)
     assert -step.heat["contacts"]["UB/LT"] == pytest.approx(flux * SIDE**2, rel=1e-9)
     assert any("clearance, as in Abaqus" in note for note in deck.notes)

@@ -365,31 +365,24 @@ def test_components_of_a_coupling_count_along_its_orientation(tmp_path, kind):
     np.testing.assert_allclose(steps[1].displacement, steps[0].displacement, atol=1e-12)
 
 
+# Local x, y and z are y, z and x of the mesh.
+TURNED = "*Nset, nset=ref\n90\n*Transform, nset=ref\n0., 1., 0., 0., 0., 1.\n"
+
+
 @pytest.mark.parametrize(
-    ("name", "components"),
-    [("xsymm", (1, 5, 6)), ("ysymm", (2, 4, 6)), ("zsymm", (3, 4, 5)), ("encastre", range(1, 7))],
-)
-def test_named_supports_of_a_node_with_rotations_hold_its_rotations(tmp_path, name, components):
-    coupled = WHOLE.replace(
-        "*Material", f"{COUPLED}*Coupling, ref node=90, surface=roof\n*Kinematic\n1, 6\n*Material", 1
-    )
-    decks = [
-        deck_of(tmp_path, coupled.replace("*Boundary\n", f"*Boundary\n{lines}", 1))
-        for lines in (f"90, {name}\n", "".join(f"90, {k}\n" for k in components))
-    ]
-    by_name, by_component = (np.argwhere(deck.model.prescribed()[0]) for deck in decks)
-    np.testing.assert_array_equal(by_name, by_component)
-
-
-def test_rotations_of_a_node_are_about_its_local_axes(tmp_path):
-    """Local x, y and z are y, z and x of the mesh."""
+    ("name", "axes", "components"),
+    [
+        ("xsymm", "", (1, 5, 6)), ("ysymm", "", (2, 4, 6)), ("zsymm", "", (3, 4, 5)), ("encastre", "", range(1, 7)),
+        ("xsymm", TURNED, (2, 4, 6)),
+    ],
+)  # fmt: skip
+def test_named_supports_of_a_node_with_rotations_hold_its_rotations(tmp_path, name, axes, components):
     coupling = f"{COUPLED}*Coupling, ref node=90, surface=roof\n*Kinematic\n1, 6\n"
-    coupled = WHOLE.replace("*Material", f"{coupling}*Nset, nset=ref\n90\n*Material", 1)
-    turned = coupled.replace("*Material", "*Transform, nset=ref\n0., 1., 0., 0., 0., 1.\n*Material", 1)
-    pairs = ((turned, "90, xsymm\n"), (coupled, "90, 2\n90, 4\n90, 6\n"))
-    decks = [deck_of(tmp_path, text.replace("*Boundary\n", f"*Boundary\n{lines}", 1)) for text, lines in pairs]
-    local, plain = (np.argwhere(deck.model.prescribed()[0]) for deck in decks)
-    np.testing.assert_array_equal(local, plain)
+    by_name, by_component = (
+        deck_of(tmp_path, before("*Boundary\n", coupling + further).replace("*Boundary\n", f"*Boundary\n{lines}", 1))
+        for further, lines in ((axes, f"90, {name}\n"), ("", "".join(f"90, {k}\n" for k in components)))
+    )
+    np.testing.assert_array_equal(*(np.argwhere(deck.model.prescribed()[0]) for deck in (by_name, by_component)))
 
 
 FREQUENCY = "*Step, perturbation\n*Frequency\n 2\n*End Step\n"

@@ -85,20 +85,6 @@ def test_temperatures_ramp_stay_go_back_and_follow_amplitudes(tmp_path):
     assert found == pytest.approx({t: 2e-5 * rise for t, rise in rises.items()}, rel=1e-9, abs=1e-15)
 
 
-def test_nodes_with_histories_of_their_own(tmp_path):
-    """Every node goes its own way through three steps: one field for each corner, the sums as the deck says."""
-    steps = [
-        "*Temperature\n" + "".join(f"{n}, {20.0 + n * (-1) ** k * (k + 1)}\n" for n in (*range(1, 9), *range(11, 19)))
-        for k in range(3)
-    ]
-    deck = deck_of(tmp_path, heated(steps=steps))
-    assert len(deck.model.temperatures) <= 4
-    for step in deck.solve():
-        rise = deck.model.temperature_rise(step.iterations["temperature_factors"])
-        k = round(step.load_factor) - 1
-        assert [rise[deck.point(n)] for n in (1, 5, 18)] == pytest.approx([n * (-1) ** k * (k + 1) for n in (1, 5, 18)])
-
-
 def test_a_material_without_expansion_keeps_its_size(tmp_path):
     deck = deck_of(tmp_path, heated(""))
     assert heights(deck)[1.0] == pytest.approx(0.0, abs=1e-15)
@@ -122,7 +108,6 @@ def test_expansion_without_temperatures_is_noted(tmp_path):
         (heated(steps="*Temperature, file=heat.frd\n"), r"\*TEMPERATURE: the parameter FILE"),
         (heated(steps="*Temperature\nall, 120., 3.\n"), r"\*TEMPERATURE: temperature gradients"),
         (heated(steps="*Temperature\nnone, 120.\n"), r"\*TEMPERATURE: set 'none' is not defined"),
-        (heated(steps="*Cflux\n17, 11, 3.\n"), r"\*CFLUX: needs a step with"),
     ],
 )
 def test_what_is_refused(tmp_path, text, said):
