@@ -85,7 +85,8 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterab
             if kinds == (list,) and isinstance(value, dict):
                 raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
             if dict in kinds and isinstance(value, list) and label != "units":
-                raise CaseError(f"write [{label}], or [{label}.NAME] if there are several, in place of [[{label}]]")
+                name = ".NAME" if label in ("contact", "obstacle") else ""
+                raise CaseError(f"write [{label}{name}] in place of [[{label}]]")
             names = " or ".join(kind.__name__ for kind in kinds)
             raise CaseError(f"the value of '{label}' must be of type {names}, not {reprlib.repr(value)}")
     for key in required:

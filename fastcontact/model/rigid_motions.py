@@ -34,6 +34,8 @@ PART = ", the part around "
 ZERO = 1e-8
 # A motion that contact does not stop within this multiple of the size of the model is unbounded.
 FAR = 1e3
+# Difference of amplitudes relative to the size of the model that may be due to the accuracy of a linear programme.
+SMALL_MOTION = 1e-3
 # Number of edges of the pyramid that is circumscribed to Coulomb's cone in three dimensions. Tangential forces at its edges
 # exceed those of the cone by 8 %.
 EDGES = 8
@@ -414,7 +416,23 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
         Size of the model [length].
     """
     stop = _relative_amplitudes(gaps, gap, work, size)
-    return None if np.abs(stop).max() > 0.99 * FAR else stop * size
+    return None if np.abs(stop).max() > 0.99 * FAR else _smallest(stop, gaps, np.maximum(gap, 0.0) / size, work) * size
+
+
+def _smallest(stop: Array, gaps: Array, gap: Array, work: Array) -> Array:
+    """Return the smallest amplitudes (k,), in the 1-norm, with the work of `stop`, which bodies without loads need not have.
+
+    `gap` (m,) is relative to the size of the model [-]. If they hardly differ from `stop`, this is returned.
+    """
+    from scipy.optimize import linprog
+
+    k, objective = len(stop), work / (np.abs(work).max() or 1.0)
+    rows = np.block(
+        [[-gaps, np.zeros_like(gaps)], [np.eye(k), -np.eye(k)], [-np.eye(k), -np.eye(k)], [-objective, np.zeros(k)]]
+    )
+    limits = np.concatenate([gap, np.zeros(2 * k), [-objective @ stop]])
+    optimum = linprog(np.repeat([0.0, 1.0], k), A_ub=rows, b_ub=limits, bounds=(None, None), method="highs").x
+    return stop if optimum is None or np.abs(optimum[:k] - stop).max() <= SMALL_MOTION else np.asarray(optimum[:k])
 
 
 def _relative_amplitudes(gaps: Array, gap: Array, work: Array, size: float) -> Array:

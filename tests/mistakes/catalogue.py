@@ -76,7 +76,7 @@ CASES = [
     ("one of several supports in single brackets", '[[support]]\ngroup = "A2B2"', '[support]\ngroup = "A2B2"',
      r"is not valid TOML: Cannot declare \('support',\) twice \(at .*\)\. If there are several, write \[\[support\]\] above each"),
     ("contact pair in double brackets", "[contact.hertz]", '[[contact]]\nname = "hertz"',
-     r"case\.toml: write \[contact\], or \[contact\.NAME\] if there are several, in place of \[\[contact\]\]"),
+     r"case\.toml: write \[contact\.NAME\] in place of \[\[contact\]\]"),
     ("support called fix", "[[support]]", "[[fix]]", r"case\.toml: unknown key 'fix': did you mean 'support'\?"),
     ("probe by coordinates", 'C1 = "C1"', "C1 = [0.0, 0.0]",
      r"case\.toml: 'probes\.C1' must be the name of a group of one point, not \[0\.0, 0\.0\]"),
