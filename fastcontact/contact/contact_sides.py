@@ -280,11 +280,8 @@ class ContactSides:
         pairing = self.pair_candidates(nodes, config, np.inf)
         directions = tangents(pairing.normal)
         motion = relative_motion(nodes, pairing, len(self.points))
-        slip0, increment = (
-            self.slip_at_rest(nodes, pairing, directions, config),
-            (config.displacement - config.start).ravel(),
-        )
+        slip0, increment = self.slip_at_rest(nodes, pairing, directions, config), config.displacement - config.start
         slip = np.zeros_like(pairing.normal)
         for constant, direction in zip(slip0, directions, strict=True):
-            slip += (rows_of(motion, direction) @ increment + constant)[:, None] * direction
+            slip += (rows_of(motion, direction) @ increment.ravel() + constant)[:, None] * direction
         return np.where(pairing.paired[:, None], slip, 0.0)
