@@ -95,8 +95,9 @@ def settle_heat(
             return replace(temperatures, balance={**temperatures.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, temperatures.rise)
         equilibrium = solve(thermal_load(problem, load, rise), equilibrium)
-    relative = change / largest(temperatures.rise)
-    accepted = f", or accept this accuracy with Criteria(geometry={2 * relative:.0e})" if relative < NOTABLE else ""
+    size, accepted = largest(temperatures.rise), ""
+    if change < NOTABLE * size:
+        accepted = f", or accept this accuracy with Criteria(geometry={2 * change / size:.0e})"
     raise ConvergenceError(
         f"heat and contact do not converge: after {limit} exchanges, temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "

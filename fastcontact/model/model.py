@@ -150,8 +150,13 @@ class Model(ModelSupports, metaclass=_PublicNames):
         self.material_numbers()
         items: list[Any] = [*self.supports, *self.loads, *self.relations]
         items += [*self.temperatures, *self.initial_states, *self.heat_loads]
-        if self.kinematics == "axisymmetric" and is_along_radius([*items, *self.materials, *self.contact]):
-            raise ModelError("in axisymmetry the radius is x: use tables along x instead of radius")
+        if self.kinematics == "axisymmetric":
+            named_items = [(item.name, item) for item in items]
+            named_items += [(f"the material with {material.described}", material) for material, _ in self.materials]
+            named_items += [(f"contact '{pair.name}'", pair) for pair in self.contact]
+            for name, item in named_items:
+                if is_along_radius(item):
+                    raise ModelError(f"{name}: in axisymmetry the radius is x: use a table along x instead of radius")
         if self.initial_states:
             self.refuse_nonlinear("initial stresses and strains are")
         fixed, prescribed = self.prescribed_by_ramp()

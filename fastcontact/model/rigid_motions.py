@@ -420,13 +420,17 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
 
 
 def _smallest(stop: Array, gaps: Array, gap: Array, work: Array) -> Array:
-    """Return the smallest amplitudes (k,), in the 1-norm, with the work of `stop`, which bodies without loads need not have.
+    """Return the smallest amplitudes (k,) with the work of `stop`, so that bodies without loads stay in place [-].
 
-    `gap` (m,) is relative to the size of the model [-]. If they hardly differ from `stop`, this is returned.
+    The amplitudes minimise the 1-norm. `stop` is returned if motions without work are small, or if the result hardly differs
+    from it. `gap` (m,) is relative to the size of the model [-]; for the other parameters see `stopped_at`.
     """
+    if np.abs(stop[work == 0.0]).max(initial=0.0) <= SMALL_MOTION:
+        return stop
     from scipy.optimize import linprog
 
-    k, objective = len(stop), work / (np.abs(work).max() or 1.0)
+    k, objective = len(stop), work / np.abs(work).max()
+    # The variables are the amplitudes and bounds of their absolute values.
     rows = np.block(
         [[-gaps, np.zeros_like(gaps)], [np.eye(k), -np.eye(k)], [-np.eye(k), -np.eye(k)], [-objective, np.zeros(k)]]
     )
