@@ -109,9 +109,10 @@ def complementarity(settled, sizes: Sizes) -> tuple[float, float, float]:
 
 
 def displaced_gaps(settled, u: np.ndarray, sizes: Sizes) -> float:
-    """Return by how much gaps of closed constraints differ from those of the displacements u (n_dofs,), over their size.
+    """Return the largest difference between gaps of closed constraints and those of the displacements u (n_dofs,) [-].
 
-    Only of constraints without compliance whose force is that of a node alone, and not with laws of two branches.
+    It is relative to the largest displacement. Constraints with compliance, constraints whose forces are coupled or shared
+    with others, and models with laws of two branches are not compared.
     """
     state, constraints = settled.solution, settled.constraints
     if any(part.branches is not None for part in constraints.parts.values()):

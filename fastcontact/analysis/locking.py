@@ -103,7 +103,7 @@ def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name:
     """Return integrals (n_bodies, 4) of energies and of squared mean stresses, of the difference and of the stress."""
     mesh, field, element = problem.model.mesh, problem.field, elements.get(name)
     xi, weights = integration_rule(element, 2)
-    N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
+    N, dN = np.ascontiguousarray(element.shape(xi)), element.gradient(xi)
     body, n = bodies(mesh)[1], len(mesh.cells[name])
     nearly_incompressible = field.averaged if problem.bodies else _poisson_ratios(problem.model, field)[1]
     selected = nearly_incompressible & (name in SIMPLICES)

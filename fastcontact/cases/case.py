@@ -441,5 +441,6 @@ def stored_description(data: dict[str, Any]) -> dict[str, Any]:
 
     `data` is the parsed text. It is empty for results without a case file.
     """
-    (theories, approach), ramp = _theories(data), _ramp(data.get("ramp", {})).table
+    theories, approach = _theories(data)
+    ramp = _ramp(data.get("ramp", {})).table
     return {"title": data.get("title", ""), "theories": theories, "approach": approach, "ramp": ramp}

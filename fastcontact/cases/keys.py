@@ -84,7 +84,7 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterab
         if kinds is not None and (not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds)):
             if kinds == (list,) and isinstance(value, dict):
                 raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
-            if dict in kinds and isinstance(value, list) and label != "units":
+            if dict in kinds and isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
                 name = ".NAME" if label in ("contact", "obstacle") else ""
                 raise CaseError(f"write [{label}{name}] in place of [[{label}]]")
             names = " or ".join(kind.__name__ for kind in kinds)

@@ -511,7 +511,8 @@ class _BlockDiagonal:
                 entries = np.ones(len(in_block)), (in_block, np.arange(len(in_block)))
                 P_blocks.append(csr_array(csr_array(entries, (len(rows), len(in_block))) @ P))
                 S_blocks.append(S)
-        return d, csr_array(hstack(P_blocks, format="csr")), block_diag(np.zeros((0, 0)), *S_blocks)  # not of (1, 0)
+        S = block_diag(np.zeros((0, 0)), *S_blocks)  # without any argument, the shape would be (1, 0)
+        return d, csr_array(hstack(P_blocks, format="csr")), S
 
     def apply(self, multiplier: Array) -> Array:
         blocks = zip(self._compliances, np.split(multiplier, np.cumsum(self._sizes)[:-1]), strict=True)

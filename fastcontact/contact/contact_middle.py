@@ -158,8 +158,10 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     surface, nodes, crossed = pair.secondary, pair.points[pair.secondary.points], list[tuple[Array, Array, Array]]()
     points, normal = nodes.copy(), normal.copy()
     for first, second, rotation in surface.periodic_ends:
+        if first is second:  # a plane of symmetry
+            continue
         moved = _parts_at_second_end(surface, closed | (force != 0.0), first, second)
-        if first is not second and moved.any():  # not a plane of symmetry
+        if moved.any():
             crossed.append((nodes[first[0]], nodes[second[0]], rotation))
             points[moved] = nodes[first[0]] + (points[moved] - nodes[second[0]]) @ rotation
             normal[moved] = normal[moved] @ rotation
@@ -247,7 +249,8 @@ def _middle_in_2d(
     if crossed:
         jump = float(-np.diff(line.lengths(np.array(crossed[0][:2])))[0])
         start = float(weight @ (lengths + jump * (points != coordinates[surface.points]).any(axis=1)))
-        start -= 0.0 if 0.0 <= start <= line.abscissa[-1] else jump
+        if not 0.0 <= start <= line.abscissa[-1]:
+            start -= jump
         line, direction = replace(line, period=abs(jump)), None
     elif len(planes) == 1 and not line.period:
         direction, on_plane = planes[0]

@@ -57,9 +57,6 @@ class ContactSides:
     excluded: Mask = field(init=False, repr=False)
     # Whether the constraints need tangents, for friction, tying or a cohesive layer; adhesion needs none.
     has_tangents: bool = field(init=False, repr=False)
-    # Whether gaps are linearised at the mean of the displacements at which the sides were paired and those of the subsequent
-    # solution, which reduces the error of a Newton step. Otherwise, they are linearised at the former.
-    linearised_at_mean: bool = field(init=False, default=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.normals is None:

@@ -190,8 +190,8 @@ class Slips:
         d_points : Variation
             Variation of `points`.
         points : Points
-        weights : csr_array (n, n_points) or None
-            Weights of the points in the slips; None if each slip is that of one point.
+        weights : csr_array (n, q) or None
+            Weights of the q `points` in the slips; None if each slip is that of one point.
         normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
             Normals of the constraints, their variation, and the variation of the primary normals of `closing` [-].
         """

@@ -209,9 +209,8 @@ class _SurfacePoints:
         xi = np.einsum("nid,nd->ni", self._inverse, relative_motion - self._gap * d_direction)
         foot = np.einsum("nid,ni->nd", self._foot_gradient, xi)
         weights = np.einsum("nki,ni->nk", self._weight_gradient, xi)
-        return Variation(
-            xi, weights, self._foot_nodes, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi)
-        )
+        normal = at_fixed_xi + np.einsum("nid,ni->nd", self._normal_gradient, xi)
+        return Variation(xi, weights, self._foot_nodes, foot, normal)
 
     def stiffness(self, force: Array) -> csr_array:
         r"""Return the stiffness (n_dofs, n_dofs) of constant normal forces (n,) [force] at the points [force / length].

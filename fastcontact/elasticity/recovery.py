@@ -86,7 +86,7 @@ class CellStress:
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
-        N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
+        N, dN = np.ascontiguousarray(element.shape(xi)), element.gradient(xi)
         loops, points, cells = LOOPS[self._mesh.dim], self._mesh.points, parallel.read_only(cells)
 
         def fill_rows(span: tuple[int, int]) -> None:

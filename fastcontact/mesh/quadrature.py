@@ -70,11 +70,14 @@ def triangle_3_sides() -> Rule:
 
 
 def _orbit_rule(orbits: list[tuple[float, ...]]) -> Rule:
-    """Return the symmetric rule on the triangle whose orbits have the given weights and barycentric coordinates."""
+    """Return the symmetric rule on the triangle whose orbits have the given weights and barycentric coordinates.
+
+    The weights of all points add up to 1 before they are multiplied by the area of the triangle.
+    """
     points: list[tuple[float, float]] = []
     weights: list[float] = []
     for weight, *coordinates in orbits:
-        a, b = (*coordinates, *coordinates, 1.0 / 3.0, 1.0 / 3.0)[:2]
+        a, b = (2 * coordinates or [1.0 / 3.0, 1.0 / 3.0])[:2]
         orbit = dict.fromkeys(permutations((a, b, 1 - (a + b) if coordinates else a)))
         points += [(y, x) for x, y, _ in orbit]
         weights += [weight] * len(orbit)

@@ -149,6 +149,7 @@ class ForceDrivenObstacles:
         """Return rows (m, n_dofs) with columns for the obstacles, which are empty except for obstacle `number`."""
         if number is None:
             return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
-        columns, dim = np.zeros((rows.shape[0], len(self) * self.shape[1])), self.shape[1]
+        dim = self.shape[1]
+        columns = np.zeros((rows.shape[0], len(self) * dim))
         columns[:, number * dim : (number + 1) * dim] = -self._directions(rows)
         return csr_array(hstack([rows, csr_array(columns)], format="csr"))

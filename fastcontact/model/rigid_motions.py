@@ -329,8 +329,8 @@ def cone_rows(
 
     Without friction these are the rows of the gaps. With friction they are ``n + mu t`` and ``n - mu t`` in the plane, and in
     3D the EDGES edges of the pyramid circumscribed to Coulomb's cone. Rows of equality constraints appear with both signs.
-    `factor` multiplies the coefficients of friction. If a list of `added` edges is given, each a direction (k, m) along the
-    tangents, the pyramid is inscribed in the cone.
+    `factor` multiplies the coefficients of friction. If a list of `added` edges is given, even an empty one, the pyramid is
+    inscribed in the cone. Each edge is a direction (2, m) along the tangents [-].
     """
     rows, gap0 = _edges(constraints, factor, added)
     bilateral = np.flatnonzero(np.resize(constraints.equality, len(gap0)))

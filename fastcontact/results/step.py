@@ -175,10 +175,10 @@ class ContactResult(NameSuggestions):
         Lower and upper bound of the contact radius, in 2D of the half-width along the `tangent` [length]; NaN without
         contact. They are the distances from the `middle` to the outermost closed node and to the first open node beyond it,
         in finite strain in the deformed configuration. With `continuous` contact, integration points take the place of
-        nodes. In 3D, pairs of a closed and an open node with a common facet are
-        considered; the lower bound is the smallest distance of their closed nodes and the upper bound the largest distance of
-        their open nodes, so that all semi-axes of an elliptic contact lie between the bounds. If the contact is a ring around
-        an open middle, the bounds refer to its outer edge. The upper bound is infinite if the side is closed up to its edge.
+        nodes. In 3D, pairs of a closed and an open node with a common facet are considered; the lower bound is the smallest
+        distance of their closed nodes and the upper bound the largest distance of their open nodes, so that all semi-axes of
+        an elliptic contact lie between the bounds. If the contact is a ring around an open middle, the bounds refer to its
+        outer edge. The upper bound is infinite if the side is closed up to its edge.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)

@@ -185,7 +185,7 @@ def _cell_arrays(
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
-    N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
+    N, dN = np.ascontiguousarray(element.shape(xi)), element.gradient(xi)
     cells, field = mesh.cells[name][rows], model.material_field()
     numbers = field.moduli_rows[name][rows]
     cell_stress = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, offset)

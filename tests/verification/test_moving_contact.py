@@ -46,11 +46,11 @@ CASES += [(name, "hex8") for name in ("dual", "node_to_segment")]
 
 @pytest.mark.parametrize(("name", "element"), CASES)
 def test_friction_and_wear_are_those_of_the_force_of_the_pad(name, element):
-    """In steps of half a facet, also in each step alone: coefficient times force times distance."""
+    """The work of friction is coefficient times force times distance, in total and in each step of half a facet."""
     count, travel = (8, 2.0) if element == "quad4" else (4, 1.0)
     options = {"friction": FRICTION, "wear": COEFFICIENT} | FORMULATIONS[name]
     steps, _ = slid(count, travel, element, **options)
-    for step in steps[2:]:  # it shears at first
+    for step in steps[2:]:  # in the first step of sliding, the pad also shears
         contact = step.contact["pad"]
         assert contact.dissipation == pytest.approx(FRICTION * FORCE * travel / count, rel=1e-3)
         assert abs(contact.force[0]) == pytest.approx(FRICTION * FORCE, rel=2e-3)
@@ -59,7 +59,7 @@ def test_friction_and_wear_are_those_of_the_force_of_the_pad(name, element):
     work = steps[-1].work
     assert work["friction_work"] == pytest.approx(FRICTION * FORCE * travel, rel=5e-3)
     assert abs(work["imbalance"]) < 5e-3 * work["friction_work"]
-    assert steps[-1].contact["pad"].sliding_load is not None
+    assert steps[-1].contact["pad"].sliding_load.sum() > 0.0
 
 
 @pytest.mark.parametrize("name", FORMULATIONS)

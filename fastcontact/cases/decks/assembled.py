@@ -34,10 +34,10 @@ class Element:
     scope: str
     number: int
     cell: Cell
-    type: Any  # ElementType
+    type: Any  # ElementType or None
     points: tuple[int, ...]
     row: int = -1
-    section: Any = None  # Section
+    section: Any = None  # Section or None
 
     def face(self, facet: int) -> Face:
         """Return the face of a solid that is the facet of its mesh element with this index."""

@@ -62,7 +62,8 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
 def _equations(deck_mesh: DeckMesh, block: Block, axes: Mapping[int, Array]) -> Iterator[list[Term]]:
     """Yield the terms of each equation of *EQUATION, whose lines state their number and then node, component and coefficient.
 
-    The components are along the local `axes` of points, those of the terms along the global axes.
+    The components are along the local `axes` of points, those of the terms along the global axes. Raises CaseError if the
+    number of terms is wrong, or if all coefficients are zero.
     """
     rows = block.iter_rows()
     for first in rows:
@@ -70,9 +71,10 @@ def _equations(deck_mesh: DeckMesh, block: Block, axes: Mapping[int, Array]) -> 
         if not 1 <= count <= MOST_TERMS:
             raise first.error(f"an equation cannot have {count} terms")
         while n_terms < count and (row := next(rows, None)) is not None:
-            for start in (start for start in range(0, len(row.entries), 3) if row.text(start)):
-                terms += _equation_terms(deck_mesh, row, start, axes)
-                n_terms += 1
+            for start in range(0, len(row.entries), 3):
+                if row.text(start):
+                    terms += _equation_terms(deck_mesh, row, start, axes)
+                    n_terms += 1
         if n_terms != count:
             raise first.error(f"the equation has {n_terms} terms, {count} are announced")
         if not any(coefficient for _, _, coefficient in terms):
@@ -231,10 +233,10 @@ def contact_pair(content: Content, block: Block) -> None:
         content.note(block, "SMALL SLIDING: no effect, contact is detected in the deformed configuration")
     adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
     interaction = block.required("INTERACTION")
-    content.pairs += [Pair(*sides, interaction, adjust=adjust) for sides in sides_of(block, "a contact pair")]
+    content.pairs += [Pair(*sides, interaction, adjust=adjust) for sides in _sides_of(block, "a contact pair")]
 
 
-def sides_of(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
+def _sides_of(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
     """Yield the location of each data line with the names of its secondary and its primary surface."""
     for row in block.iter_rows():
         if len([entry for entry in row.entries if entry]) != 2:
@@ -258,7 +260,7 @@ def tie(content: Content, block: Block) -> None:
     """Read *TIE: tied surfaces, or the end surfaces of a cyclic sector."""
     if "CYCLIC SYMMETRY" in block.parameters:
         block.only_row()
-        content.sector_ends += [(block, first, second) for _, first, second in sides_of(block, "cyclic symmetry")]
+        content.sector_ends += [(block, first, second) for _, first, second in _sides_of(block, "cyclic symmetry")]
         return
     adjust = block.choice("ADJUST", ("YES", "NO"))
     if tolerance := block.get("POSITION TOLERANCE"):
@@ -269,7 +271,7 @@ def tie(content: Content, block: Block) -> None:
         content.note(block, f"POSITION TOLERANCE={value:g}: {text}")
     if adjust == "YES" and "ADJUST" in block.parameters:
         content.note(block, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
-    content.pairs += [Pair(*sides, tied=True) for sides in sides_of(block, "a tie")]
+    content.pairs += [Pair(*sides, tied=True) for sides in _sides_of(block, "a tie")]
 
 
 def multi_point(content: Content, block: Block) -> None:

@@ -50,7 +50,10 @@ def blocks_by_set(assembly: Assembly, keyword: str, kind: str) -> dict[str, Bloc
 
 
 def add_springs(model: Model, assembly: Assembly, thickness: float) -> None:
-    """Add the springs; their stiffness is divided by the thickness [length]."""
+    """Add the springs; their stiffness is divided by the thickness [length].
+
+    Raises CaseError if an element of *SPRING is not a spring, or if a spring has no stiffness or more than one.
+    """
     for name, block in blocks_by_set(assembly, "SPRING", "SPRINGA").items():
         rows = block.rows
         if len(rows) != 1:
@@ -67,7 +70,7 @@ def add_springs(model: Model, assembly: Assembly, thickness: float) -> None:
 def add_gap_facets(deck_mesh: DeckMesh) -> list[Gaps]:
     """Return the gap elements by set, and create groups of the facets at their first nodes and, in solids, second nodes.
 
-    Raises CaseError if the nodes do not fill whole facets.
+    Raises CaseError if a direction is missing, if an element is not a gap element, or if the nodes do not fill whole facets.
     """
     gaps = []
     for key, block in blocks_by_set(deck_mesh, "GAP", "GAPUNI").items():

@@ -259,6 +259,14 @@ class Formulation(ContactSides, ABC):
             options["geometry"] = partial(self._linearised_points, candidates, pairing, config, directions)
         return Constraints(B, gap0, candidates.positions(self.points), compliance, **options)
 
+    @property
+    def linearised_at_mean(self) -> bool:
+        """Whether gaps are linearised at the mean of the displacements at which the sides were paired and of the solution.
+
+        This reduces the error of a Newton step. Otherwise, they are linearised at the former.
+        """
+        return False
+
     def _linearised_points(
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array],
         multiplier: Array, tangential: Array, displacement: Array,

@@ -169,9 +169,8 @@ class WeightedMortar(Formulation):
     def _overlap(self, config: Configuration) -> Overlap:
         deformed = self.points + config.displacement
         if isinstance(self.primary, RigidSide):
-            return obstacle_overlap(
-                self.secondary, self.primary, (self.points, deformed), self.axisymmetric, config.pose
-            )
+            coordinates = self.points, deformed
+            return obstacle_overlap(self.secondary, self.primary, coordinates, self.axisymmetric, config.pose)
         if deformed.shape[1] == 3:
             return face_overlap(self.secondary, self.primary, self.points, deformed, self.smoothing)
         options = self.axisymmetric, self.projection_tolerance, self.smoothing

@@ -220,6 +220,6 @@ def crowned_blocks(
 
 
 def _positions(size: float, radius: float, length: float, growth: float) -> Array:
-    """Return positions (n + 1,) from 0 to `length`, with a spacing of about `size` up to `radius`, then growing [length]."""
+    """Return positions (n + 1,) [length] from 0 to `length`, with a spacing near `size` up to `radius` that grows beyond."""
     equal = np.linspace(0.0, radius, segments(round(radius / size)) + 1)
     return np.concatenate([equal, radius + growing_positions(length - radius, size * growth, growth)[1:]])
