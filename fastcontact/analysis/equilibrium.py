@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._tools.records import field, record
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import LINEAR_ERROR, NOTABLE
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.problem import Problem, StepLoad
@@ -293,7 +293,7 @@ def _round_off(problem: Problem, product: Array, forces: tuple[Array, ...], scal
     for magnitudes in map(np.abs, forces):
         if ((magnitudes > noise) & (magnitudes * problem.criteria.relative > SUM_ROUND_OFF * product)).any():
             return force_round_off, noise
-    return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(product), force_round_off), noise
+    return max(max(ROUND_OFF, LINEAR_ERROR * problem.solver.tolerance) * largest(product), force_round_off), noise
 
 
 @record

@@ -326,6 +326,7 @@ class FloatingBodies:
 
     def moving(self, rigid: RigidPosition) -> list[str]:
         """Return the motions of bodies in the free rigid-body modes with the largest generalised forces of the springs."""
+        # A message names the motions with the largest forces, within a factor of ten.
         work = np.abs(self._values_at_springs.T @ rigid.spring_force)
         return self.motions.combined(self._values_at_springs[:, work > 0.1 * work.max()]).names()
 

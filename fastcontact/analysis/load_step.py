@@ -129,10 +129,10 @@ def _end_of_step(
         end = replace(end, extrapolation=extrapolation)
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
-    if problem.floating_bodies is not None and end.rigid is not None and settled is not None:
+    if problem.floating_bodies is not None and settled is not None and (rigid := settled.iterate.rigid) is not None:
         # May be round-off relative to contact forces. Without loads it is zero, and contact forces are round-off.
         scale = end.largest_rigid_force
-        report = problem.floating_bodies.report(end.rigid, scale and max(scale, end.largest_force))
+        report = problem.floating_bodies.report(rigid, scale and max(scale, end.largest_force))
         forces = settled.constraints, settled.solution.multiplier
         free = problem.floating_bodies.undetermined(*forces, u, scale, balance.residual)
         moving = (np.abs(free.displacement) > SINGLE_PRECISION).any(axis=1)
@@ -164,7 +164,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         forces = generalised_forces(problem.floating_bodies.motions, load_as_force.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
     start = replace(
-        state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
+        state, gap_round_off=round_off, largest_rigid_force=rigid_force, last_change=None,
         largest_force=max(state.largest_force, largest(load_as_force.force)),
     )  # fmt: skip
     if problem.extrapolates:
@@ -247,7 +247,7 @@ def _contact_at_end(
     stored = sum(map(attrgetter("stored"), (*forces.values(), *bonds.values())))
     released = sum(map(attrgetter("released"), bonds.values()))
     end = replace(
-        end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
+        end, active=settled.iterate.active, pressure=settled.iterate.pressure,
         last_change=settled.last_change, never_opening=never_opening, elastic_slip=elastic_slip, bonds=bonds, worn=worn,
         wear={}, slipped=slipped, forces=forces, touched=frozenset(touched), first_contact=first_contact,
         work=start.work and start.work.after(energy, stored, work_increments.tolist(), released, work_on_wear),

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from fastcontact._tools.records import replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import LINEAR_ERROR, NOTABLE
 from fastcontact.analysis.equilibrium import StepEquilibrium
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Heat, Temperatures
@@ -83,7 +83,7 @@ def settle_heat(
     """
     heat, mixing = problem.heat, Anderson(DEPTH, np.arange(len(rise)))
     assert heat is not None
-    tolerance = max(problem.criteria.geometry, 10 * heat.linear_tolerance)
+    tolerance = max(problem.criteria.geometry, LINEAR_ERROR * heat.linear_tolerance)
     change, limit = np.inf, max(problem.criteria.max_geometry_updates, 1)
     for exchange in range(1, limit + 1):
         temperatures = _steady_temperatures(problem, start, load, instant, equilibrium)

@@ -25,7 +25,7 @@ from fastcontact.contact.surface import Surface, by_block, padded
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
-from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF
+from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Adjacent facets whose normals enclose a smaller angle [degrees] approximate a smooth surface; others form a corner. The
 # value differs from the exterior angles of all regular polygons, so that round-off has no influence on their normals.
@@ -401,4 +401,4 @@ def smooth_ends(side: Surface, normals: Array) -> Mask:
     """
     total = np.zeros((len(side.points), 2))
     np.add.at(total, side.ends, normals[:, :2])
-    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[side.ends] > 2.0 - 1e-6))
+    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[side.ends] > 2.0 - SINGLE_PRECISION))
