@@ -40,7 +40,9 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 # Folders of the ready-made cases, in an installed package and in a checkout.
 _CASE_FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 # Possessive quantifiers and the lookbehind keep the search linear in the length of the line.
-_DECIMAL_COMMA = re.compile(r"(?<![\w.-])(?P<key>[\w.-]++)\s*+=\s*+(?P<whole>[+-]?\d++),(?P<digits>\d++(?:[eE][+-]?\d+)?)")
+_DECIMAL_COMMA = re.compile(
+    r"(?<![\w.-])(?P<key>[\w.-]++)\s*+=\s*+(?P<whole>[+-]?\d++),(?P<digits>\d++(?:[eE][+-]?\d+)?)"
+)
 
 
 def ready_made_cases() -> dict[str, Path]:
