@@ -20,11 +20,12 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers, largest
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
-from fastcontact.contact.search.facet_tables import flat_triangles, tables
+from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import Surface, by_block, padded
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
+from fastcontact.mesh.flat_pieces import flat_triangles
 from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF
 
 # Adjacent facets whose normals enclose a smaller angle [degrees] approximate a smooth surface; others form a corner. The

@@ -9,8 +9,8 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import closest_of_types
-from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_pieces
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -122,10 +122,3 @@ def winding_numbers(points: Array, pieces: Array) -> Array:
             cosine = r.prod(axis=1) + sum(products[:, k, k - 1] * r[:, k - 2] for k in range(3))
         numbers[i] = np.arctan2(sine, cosine).sum() / (2.0 * np.pi)
     return numbers
-
-
-def flat_pieces(n_nodes: int, dim: int) -> Indices:
-    """Return the local nodes of the lines (n, 2) or triangles (n, 3) that approximate a facet with `n_nodes` nodes."""
-    if dim == 2:
-        return np.array([[0, 1]] if n_nodes == 2 else [[0, 2], [2, 1]])
-    return flat_triangles(n_nodes)

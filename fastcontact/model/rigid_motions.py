@@ -18,7 +18,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, node_at
 from fastcontact.mesh.topology import RigidParts, bodies, rigid_parts
 from fastcontact.round_off import TINY
 
@@ -296,11 +296,6 @@ def _joint_motions(mesh: Mesh, body_parts: RigidParts, part_motions: list[tuple[
         at_hinges[row, :, ends[number] : ends[number + 1]] = motion[np.searchsorted(members, node)]
     same_node = body_parts.hinge_node[1:] == body_parts.hinge_node[:-1]
     return _null_space((at_hinges[1:] - at_hinges[:-1])[same_node].reshape(int(same_node.sum()) * mesh.dim, width))
-
-
-def node_at(mesh: Mesh, node: int) -> str:
-    """Return the number and the position of a node for messages."""
-    return f"point {node} at ({', '.join(f'{x:.6g}' for x in mesh.points[node])})"
 
 
 def _part_name(mesh: Mesh, body_parts: RigidParts, number: int) -> str:
