@@ -99,7 +99,8 @@ def _depths(points: Array, facets: list[Array], selected: list[Mask] | None = No
     # The vector from the closest point is parallel to the normal only if this point lies in the interior of a facet.
     undecided = np.flatnonzero((np.abs(height) < 0.999 * closest.distance) & (closest.distance > ON_SURFACE * size))
     if len(undecided):
-        pieces = [nodes[:, flat_pieces(*nodes.shape[1:])].reshape(-1, *2 * nodes.shape[2:]) for nodes in facets]
+        dim = points.shape[1]
+        pieces = [nodes[:, flat_pieces(nodes.shape[1], dim)].reshape(-1, dim, dim) for nodes in facets]
         inside[undecided] = winding_numbers(points[undecided], np.concatenate(pieces)) > 0.5
     depth = np.where(inside & (closest.distance > ON_SURFACE * size), closest.distance, 0.0)
     return depth, np.flatnonzero(np.concatenate(selected))[closest.facet]
