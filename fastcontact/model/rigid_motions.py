@@ -36,6 +36,8 @@ ZERO = 1e-8
 FAR = 1e3
 # Difference of amplitudes relative to the size of the model that may be due to the accuracy of a linear programme.
 SMALL_MOTION = 1e-3
+# Largest coefficient of a motion that is attributed to the tolerance of the linear programme [-].
+NO_MOTION = 1e-6
 # Number of edges of the pyramid that is circumscribed to Coulomb's cone in three dimensions. Tangential forces at its edges
 # exceed those of the cone by 8 %.
 EDGES = 8
@@ -379,11 +381,14 @@ def mechanisms(gaps: Array, forces: Array, simple: Array) -> Array:
     free = ((changes >= -ZERO).all(axis=0) | (changes <= ZERO).all(axis=0)) & ~loaded
     if free.any():
         return simple[:, free]
-    for axis in range(k):
-        for sign in (1.0, -1.0):
-            motion = _maximiser(sign * np.eye(k)[axis], gaps, np.zeros(len(gaps)), scaled_forces, 1.0)
-            if np.abs(motion).max(initial=0.0) > 1e-6:
-                return motion[:, None]
+    closed = np.zeros(len(gaps))
+    # Each motion changes a gap, so one that closes none exists if and only if the sum of the changes can be positive.
+    if np.abs(_maximiser(gaps.sum(axis=0), gaps, closed, scaled_forces, 1.0)).max() <= NO_MOTION:
+        return np.empty((k, 0))
+    for objective in np.kron(np.eye(k), [[1.0], [-1.0]]):  # motions with few components, for messages
+        motion = _maximiser(objective, gaps, closed, scaled_forces, 1.0)
+        if np.abs(motion).max() > NO_MOTION:
+            return motion[:, None]
     return np.empty((k, 0))
 
 
