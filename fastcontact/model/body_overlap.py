@@ -113,13 +113,15 @@ def winding_numbers(points: Array, pieces: Array) -> Array:
     their angles in the plane, or of their solid angles (Van Oosterom and Strackee, 1983, eq. 8), divided by a full angle.
     Angles are positive for outward normals.
     """
-    numbers = np.empty(len(points))
+    corners, numbers = np.ascontiguousarray(np.moveaxis(pieces, 0, 2)), np.empty(len(points))
     for i, point in enumerate(points):
-        arms = pieces - point
-        products = np.einsum("mid,mjd->mij", arms, arms)
-        sine, cosine = np.linalg.det(arms), products[:, 0, 1]
-        if arms.shape[2] == 3:  # half the solid angle
-            r = np.sqrt(np.diagonal(products, axis1=1, axis2=2))
-            cosine = r.prod(axis=1) + sum(products[:, k, k - 1] * r[:, k - 2] for k in range(3))
+        arms = corners - point[:, None]
+        products = np.einsum("idm,jdm->ijm", arms, arms)
+        a, b, *c = arms  # written out, determinants take a fourteenth of the time of `numpy.linalg.det`
+        sine, cosine = a[0] * b[1] - a[1] * b[0], products[0, 1]
+        if c:  # half the solid angle
+            sine = sum(c[0][k] * (a[k - 2] * b[k - 1] - a[k - 1] * b[k - 2]) for k in range(3))
+            r = np.sqrt(products[range(3), range(3)])
+            cosine = r.prod(axis=0) + sum(products[k, k - 1] * r[k - 2] for k in range(3))
         numbers[i] = np.arctan2(sine, cosine).sum() / (2.0 * np.pi)
     return numbers
