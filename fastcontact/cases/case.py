@@ -39,6 +39,10 @@ DECK_SUFFIX = ".inp"
 _PACKAGE = Path(__file__).resolve().parents[1]
 # Folders of the ready-made cases, in an installed package and in a checkout.
 _CASE_FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
+# Possessive quantifiers and the lookbehind keep the search linear in the length of the line.
+_DECIMAL_COMMA = re.compile(
+    r"(?<![\w.-])(?P<key>[\w.-]++)\s*+=\s*+(?P<whole>[+-]?\d++),(?P<digits>\d++(?:[eE][+-]?\d+)?)"
+)
 
 
 def ready_made_cases() -> dict[str, Path]:
@@ -252,9 +256,27 @@ def _read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     try:
         return text, toml_text.parse(text)
     except ValueError as error:
-        twice = re.search(r"Cannot declare \('(\w+)',\) twice", str(error))
-        hint = f". If there are several, write [[{twice[1]}]] above each" if twice and twice[1] in LISTS else ""
-        raise CaseError(f"the case file '{path}' is not valid TOML: {error}{hint}") from error
+        reason = _frequent_mistake(text, str(error)) or error
+        raise CaseError(f"the case file '{path}' is not valid TOML: {reason}") from error
+
+
+def _frequent_mistake(text: str, message: str) -> str:
+    """Return the line, the key and the remedy of a frequent mistake, or an empty string for other messages of the parser.
+
+    The frequent mistakes are a decimal comma, and one of several tables in single brackets.
+    """
+    lines, place = text.replace("\r\n", "\n").rstrip().split("\n"), re.search(r"at line (\d+), column (\d+)", message)
+    number, column = (int(place[1]), int(place[2]) - 1) if place else (len(lines), len(lines[-1]))
+    line = lines[number - 1] if number <= len(lines) else ""
+    for comma in _DECIMAL_COMMA.finditer(line):
+        if comma.end("whole") <= column <= comma.end():  # the comma, or the end of the number in inline tables
+            key, correct = comma["key"], f"{comma['whole']}.{comma['digits']}"
+            return f"line {number}: '{key}' has a decimal comma: write {key} = {correct}"
+    table = re.match(r"\s*\[\[?\s*(\w+)\s*\]", line)
+    if table and "Cannot" in message and table[1] in (*LISTS, "check", "sensitivity", "contact", "obstacle"):
+        header = f"[{table[1]}.NAME]" if table[1] in ("contact", "obstacle") else f"[[{table[1]}]]"
+        return f"line {number}: there is a table [{table[1]}] above: if there are several, write {header} above each"
+    return ""
 
 
 def _reading_error(path: Path, error: Exception) -> str:

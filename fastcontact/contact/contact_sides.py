@@ -204,13 +204,17 @@ class ContactSides:
         return overlap
 
     def smoothing_slope(
-        self, candidates: Candidates, pairing: Pairing, rows: Indices, smoothing: Smoothing, config: Configuration
-    ) -> Array:
+        self, candidates: Candidates, pairing: Pairing, rows: Indices, config: Configuration
+    ) -> Array | None:
         """Return the derivatives (n, dim - 1) of `smoothing_overlap` with respect to primary reference coordinates [length].
 
-        `rows` (n,) are numbers of candidates. The derivatives are zero on the straight extensions of facets.
+        `rows` (n,) are numbers of candidates. The derivatives are zero on the straight extensions of facets. The result is
+        None without smoothing.
         """
+        if self.smoothing is None:
+            return None
         assert candidates.facet is not None
+        smoothing = self.smoothing
         axes = smoothing.frames(self.points + config.displacement)
         factor = smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
         slope = factor * smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])

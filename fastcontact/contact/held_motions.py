@@ -225,7 +225,8 @@ def reflected(side: Surface, motions: HeldMotions | None, coordinates: Array, op
     """
     if motions is None or not np.isin(side.points, motions.nodes).any():
         return side
-    across = np.zeros((len(side.points), *2 * (coordinates.shape[1],)))  # projectors onto the normals of the planes
+    dim = coordinates.shape[1]
+    across = np.zeros((len(side.points), dim, dim))  # projectors onto the normals of the planes
     for axis, nodes in symmetry_planes(motions, side, coordinates, coordinates[opposite]):
         held = motions.projectors_at(side.points[nodes]) @ axis
         across[nodes] += held[:, :, None] * held[:, None]
@@ -233,7 +234,7 @@ def reflected(side: Surface, motions: HeldMotions | None, coordinates: Array, op
     nodes = np.flatnonzero(across.any(axis=(1, 2)))
     if not len(nodes):
         return side
-    reflections = np.eye(coordinates.shape[1]) - 2.0 * across[nodes]
+    reflections = np.eye(dim) - 2.0 * across[nodes]
     return replace(side, periodic_ends=(*side.periodic_ends, (nodes, nodes, reflections)))
 
 

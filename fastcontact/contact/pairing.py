@@ -156,7 +156,8 @@ class Pairing:
         Candidates beyond the end of the primary surface are projected onto the extension of their facet.
         """
         assert self.primary is not None
-        feet = facet_points(self.primary, self.facet[rows], self.xi[rows])
+        of_rows = np.array_equal(rows, self.rows)
+        feet = self.feet if of_rows else facet_points(self.primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
             return feet
         return replace(feet, shape=feet.shape + np.einsum("nkj,nj->nk", feet.gradient, self.beyond[rows]))

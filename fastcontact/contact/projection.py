@@ -20,11 +20,12 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers, largest
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
-from fastcontact.contact.search.facet_tables import flat_triangles, tables
+from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import Surface, by_block, padded
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
+from fastcontact.mesh.flat_pieces import flat_triangles
 from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Adjacent facets whose normals enclose a smaller angle [degrees] approximate a smooth surface; others form a corner. The
@@ -137,8 +138,13 @@ class DeformedSide:
         return padded(normals)
 
     @cached_property
-    def _angles(self) -> Array:
-        """Interior angles (n_facets, k) of faces at corners [radian]; 1 at other nodes, and 0 at repeated nodes."""
+    def _weights(self) -> Array:
+        """Weights (n_facets, k) of the facet normals at nodes, zero at repeated nodes.
+
+        They are the interior angles of faces at corners [radian], and 1 at other nodes and in 2D.
+        """
+        if self.coordinates.shape[1] == 2:
+            return self.surface.node_weights
         from fastcontact.contact import projection_kernels
 
         weights = []
@@ -156,11 +162,8 @@ class DeformedSide:
         weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
         """
         node, dim = self.surface.all_local.ravel(), self.coordinates.shape[1]
-        total, weights = (
-            np.empty((len(self.surface.points), dim)),
-            self.surface.node_weights if dim == 2 else self._angles,
-        )
-        for axis, component in enumerate((weights[..., None] * self.facet_normals).reshape(-1, dim).T):
+        total = np.empty((len(self.surface.points), dim))
+        for axis, component in enumerate((self._weights[..., None] * self.facet_normals).reshape(-1, dim).T):
             total[:, axis] = np.bincount(node, component, len(total))
         self.surface.add_across_ends(total)
         length = np.linalg.norm(total, axis=1, keepdims=True)
@@ -188,7 +191,7 @@ class DeformedSide:
         """
         shape, node = self.facet_normals.shape, self.surface.all_local.ravel()
         smooth, normal = self.nodal_normals[node], self.facet_normals.reshape(-1, shape[2])
-        weight = (self.surface.node_weights if shape[2] == 2 else self._angles).ravel()
+        weight = self._weights.ravel()
         # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
         entries = np.flatnonzero(self.surface.node_weights)  # without repeated nodes
         deviates = np.einsum("pd,pd->p", normal[entries], smooth[entries]) < np.cos(np.radians(0.5 * self.corner))

@@ -271,8 +271,8 @@ def _fit(block: FacetBlock, points: Array, neighbourhood: Array, valid: Mask, de
     corners = points[block.facets[:, : elements.get(block.element).n_corners]]
     origin, normal = corners.mean(axis=1), _normals(block, points)
     size = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
-    powers = _powers(points.shape[1] - 1, degree)
-    curvature = np.zeros((len(corners), *2 * (points.shape[1] - 1,)))
+    n_tangents = points.shape[1] - 1
+    powers, curvature = _powers(n_tangents, degree), np.zeros((len(corners), n_tangents, n_tangents))
     fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(neighbourhood, valid)
     for _ in range(1, PASSES):
         slope, curvature = fit.slope_and_curvature()

@@ -10,11 +10,11 @@ import numpy as np
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ContactError, ModelError
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, node_at
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import penetration
 from fastcontact.model.ramp import Table
-from fastcontact.model.rigid_motions import FreeMotions, body_name, grouped_by_body, node_at
+from fastcontact.model.rigid_motions import FreeMotions, body_name, grouped_by_body
 from fastcontact.round_off import SINGLE_PRECISION
 
 if TYPE_CHECKING:

@@ -69,7 +69,7 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
 
 
-def _opposite_nodes(block: FacetBlock, deformed_primary: DeformedSide) -> tuple[Indices, Array]:
+def _opposite_nodes(block: FacetBlock, primary: DeformedSide) -> tuple[Indices, Array]:
     """Return the points of a block opposite the ends of primary facets, as facets and reference coordinates.
 
     Where two primary facets meet, the opposite point lies on the bisector of the angle between them, at which the closest
@@ -77,15 +77,15 @@ def _opposite_nodes(block: FacetBlock, deformed_primary: DeformedSide) -> tuple[
     side, near which points do not face the flank. It is unsuitable elsewhere: at a concave corner with a gap or an
     interference, the closest point jumps from one facet to the next as the bodies move.
     """
-    primary, deformed, normals = deformed_primary.surface, deformed_primary.coordinates, deformed_primary.nodal_normals
-    ends, first = np.unique(primary.ends, return_index=True)
-    position, normal = deformed[primary.points[ends]], normals[ends]
+    side, deformed, normals = primary.surface, primary.coordinates, primary.nodal_normals
+    ends, first = np.unique(side.ends, return_index=True)
+    position, normal = deformed[side.points[ends]], normals[ends]
     opposite = closest(position, deformed[block.facets])
     xi_0 = opposite.xi[:, 0]
-    has_two_facets = primary.inner_ends.ravel()[first]
-    cosine = np.ones(len(primary.points))  # between the normals of facets and of nodes, small at corners
-    deviation = np.einsum("fad,fad->fa", deformed_primary.facet_normals, normals[primary.all_local])
-    np.minimum.at(cosine, primary.all_local, np.where(primary.node_weights > 0.0, deviation, 1.0))
+    has_two_facets = side.inner_ends.ravel()[first]
+    cosine = np.ones(len(side.points))  # between the normals of facets and of nodes, small at corners
+    deviation = np.einsum("fad,fad->fa", primary.facet_normals, normals[side.all_local])
+    np.minimum.at(cosine, side.all_local, np.where(side.node_weights > 0.0, deviation, 1.0))
     smooth = has_two_facets & ~(cosine < np.cos(np.radians(0.5 * CORNER)))[ends]
     in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < LARGEST_CUT) & ~smooth)
     inner = np.flatnonzero(has_two_facets)
@@ -169,7 +169,7 @@ def line_overlap(
     smoothing : Smoothing or None
         The smooth surfaces that the facets approximate; None if gaps are measured between the facets.
     """
-    deformed, primary_side = primary.coordinates, primary.surface
+    deformed, side = primary.coordinates, primary.surface
     masses, couplings, gap_reductions, overlap_points = [], [], [], []
     for block, offset in zip(secondary.blocks, secondary.offsets):
         n, k = block.facets.shape
@@ -193,8 +193,8 @@ def line_overlap(
             np.add.at(gap_reduction, points.facet, points.shape[:, :, None] * vectors)
         gap_reductions.append(gap_reduction)
         covered = np.flatnonzero(area > 0)
-        rows_of_blocks = by_block(pairing.facet[covered], primary_side.sizes)
-        for primary_block, (positions, primary_facet) in zip(primary_side.blocks, rows_of_blocks, strict=True):
+        rows_of_blocks = by_block(pairing.facet[covered], side.sizes)
+        for primary_block, (positions, primary_facet) in zip(side.blocks, rows_of_blocks, strict=True):
             rows = covered[positions]
             shape = elements.get(primary_block.element).shape(pairing.xi[rows])
             products = area[rows, None, None] * points.shape[rows, :, None] * shape[:, None, :]

@@ -279,9 +279,7 @@ class Formulation(ContactSides, ABC):
         if self.linearised_at_mean:
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.pair_candidates(candidates, config, np.inf)
-        slope = (
-            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
-        )
+        slope = self.smoothing_slope(candidates, pairing, rows, config)
         options = self.primary, self.points, config, self.normals
         points = paired_points(candidates, pairing, rows, *options, slope=slope)
         if self.linearised_at_mean:

@@ -337,9 +337,7 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), primary, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        slope = (
-            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
-        )
+        slope = self.smoothing_slope(candidates, pairing, rows, config)
         options = self.primary, self.points, config
         points = paired_points(candidates, pairing, rows, *options, normals, True, slope)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
@@ -399,7 +397,8 @@ class WeightedMortar(Formulation):
         """
         coverage, D, _, weight, motion, *_ = means
         rows, substitutions = [rows_of(motion, direction) for direction in directions], []
-        held = np.zeros((len(weight), *2 * self.points.shape[1:]))
+        dim = self.points.shape[1]
+        held = np.zeros((len(weight), dim, dim))
         for axis, nodes in without_slip:
             if not (nodes & coverage.with_gap).any():
                 continue

@@ -281,7 +281,8 @@ class ModelContact(ModelConnections):
         force : mapping of str to float, optional
             Force on the obstacle at multiplier 1, such as ``{"y": -100.0}`` [force], in axisymmetry integrated over the
             full circle. In these components the obstacle is a free rigid body that only contact restrains; in the other
-            components it follows `motion`. The results contain its displacement.
+            components it follows `motion`. To guide an obstacle along an oblique direction, rotate the model such that this
+            direction is an axis. The results contain the displacement of the obstacle.
         rotation : mapping, optional
             Rotation of the obstacle about an axis that moves with `motion`. ``angle``: angle at multiplier 1 [radian].
             ``centre``: a point (dim,) on the axis before any motion [length]. ``axis``, in 3D: direction of the axis.
@@ -318,6 +319,13 @@ class ModelContact(ModelConnections):
         """
         from fastcontact.contact.obstacles.meshed import MeshedSurface
 
+        for option in ("axes", "direction"):
+            if option in options:
+                axes = " or ".join("xyz"[: self.mesh.dim])
+                raise ModelError(
+                    f"'{option}' of obstacle '{name}': obstacles are moved, pushed and guided along {axes}: give 'motion' or "
+                    "'force' by components, or rotate the points of the mesh such that the guided direction is an axis"
+                )
         components = axis_values(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(components.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
         if not np.isfinite(displacement).all():

@@ -190,9 +190,20 @@ MISTAKES = {
         ("approach = 4.0", "approach = -4.0", r"theory.hertz"),
         ("E = 20000.0\nnu", "groups = [3]\nE = 20000.0\nnu", r"'material\[0\].groups' must be a list of strings or"),
         ('primary = "CONT2"', 'primary = "CONT2"\nformulation = 3', r"'contact.hertz.formulation' must be a string"),
+        (
+            '"CONT2"',
+            '"CONT2"\nsurface_smoothing = 0',
+            r"'contact.hertz.surface_smoothing' must be true or false, not 0",
+        ),
+        (
+            "nu = 0.3",
+            "nu = 0.3\nincompatible_modes = 1",
+            r"'material\[0\].incompatible_modes' must be true or false, not 1",
+        ),
+        ("geometry_updates = 2", "keep_pairing = 1", r"'solve.keep_pairing' must be true or false, not 1"),
     ],
     LOADED: [
-        ("distribute = true", "distribute = 2", r"'force\[0\].distribute' must be true or false, not the int 2"),
+        ("distribute = true", "distribute = 1", r"'force\[0\].distribute' must be true or false, not 1"),
         ("ramp = [[0.0, 1.0], [1.0, 1.0]]", "ramp = [[0.0]]", r"'support\[0\].ramp' must be|'support\[1\].ramp' must"),
         ('component = "y"\n', "", r"couple\[0\] needs 'component'"),
         ('["A2", "y", 1.0]', '["A2", "y"]', r"'relation\[0\].terms' must be a list of"),
@@ -201,6 +212,7 @@ MISTAKES = {
     OBSTACLE: [
         ('secondary = "CONT1"\n', "", r"obstacle.plane needs 'secondary'"),
         ("half_space", "half_spaces", r"did you mean 'half_space'"),
+        ('"half_space"', '"sphere", hollow = 1', r"'obstacle.plane.shape.hollow' must be true or false, not 1"),
         ("normal =", "normals =", r"'obstacle.plane.shape.normals'"),
         (", normal = [0.0, -1.0]", "", r"'obstacle.plane.shape' needs 'normal'"),
         ("y = -2.0 }", 'y = "down" }', r"'obstacle.plane.motion' must be a table of numbers by name"),
