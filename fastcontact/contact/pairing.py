@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact._tools.records import record, replace
+from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
@@ -57,16 +57,17 @@ class Candidates:
         Point numbers of the k nodes of each candidate.
     shape : ndarray (n, k)
         Weight of each node, the value of its shape function [-].
-    facet : ndarray of int (n,), optional
+    facet : ndarray of int (n,)
         Number of the secondary facet on which each candidate lies; facets are numbered consecutively through all blocks.
-    xi : ndarray (n, dim - 1), optional
-        Reference coordinates of each candidate in its facet [-].
+        Empty if it is not needed.
+    xi : ndarray (n, dim - 1)
+        Reference coordinates of each candidate in its facet [-]; empty if they are not needed.
     """
 
     nodes: Numbers
     shape: Array
-    facet: Indices | None = None
-    xi: Array | None = None
+    facet: Indices = field(default_factory=np.empty(0, np.intp).copy)
+    xi: Array = field(default_factory=np.empty(0).copy)
 
     @classmethod
     def in_facets(cls, side: Surface, xi: Sequence[Array]) -> Candidates:

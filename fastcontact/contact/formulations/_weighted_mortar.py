@@ -36,7 +36,7 @@ from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NEGLIGIBLE_AREA, areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, Substitution
-from fastcontact.contact.linearised_projections import Points, paired_points
+from fastcontact.contact.linearised_projections import Points
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import FACING, Candidates, Normals, pair, tangents
 from fastcontact.contact.projection import DeformedSide
@@ -337,18 +337,14 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), primary, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        slope = (
-            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
-        )
-        options = self.primary, self.points, config
-        points = paired_points(candidates, pairing, rows, *options, normals, True, slope)
+        points = self.linearised_points(candidates, pairing, rows, config, normals, closest=True)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
         weights, *substitute_weights = (scaled(matrix, 1.0 / means.weight) for matrix in integrals)
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: DeformedSide | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
             all_nodes = np.arange(len(self.secondary.points))
-            separate_normals = paired_points(self.node_candidates, pairing, all_nodes, *options, self.normals)
+            separate_normals = self.linearised_points(self.node_candidates, pairing, all_nodes, config, self.normals)
         elif self.normals == "secondary":
             separate_normals = config.deformed(self.secondary, self.points)
         linearised = points, weights, means.normal, multiplier, mean, separate_normals
