@@ -32,6 +32,7 @@ from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.supported_nodes import nodes_with_undetermined_traction
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.model import Model
@@ -132,10 +133,8 @@ def _sliding_past_ends(pair: Formulation, contact: ContactResult) -> Iterator[st
         return
     distance, points = 0.0, pair.points[pair.secondary.points]
     for first, second, _ in pair.secondary.periodic_ends:
-        across = points[second] - points[first]
-        direction = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), TINY)
         slip = contact.slip_total[first] * contact.active[first, None]
-        distance = max(distance, largest((slip * direction).sum(axis=1)))
+        distance = max(distance, largest((slip * unit_vectors(points[second] - points[first])).sum(axis=1)))
     ratio, is_dual = distance / facet_length(pair.secondary, pair.points), getattr(pair, "multipliers", "") == "dual"
     if ratio > (SLIDE_PAST_ENDS_DUAL if is_dual else SLIDE_PAST_ENDS):
         yield (

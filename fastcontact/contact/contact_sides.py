@@ -33,7 +33,8 @@ from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import rows_of
 from fastcontact.mesh import elements
-from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
+from fastcontact.mesh.area_vectors import unit_vectors
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 SLIPS = ("symmetric", "primary")
 
@@ -142,8 +143,8 @@ class ContactSides:
     def _secondary_normals(self, candidates: Candidates, config: Configuration) -> Array:
         """Return averaged unit normals (n, dim) of the secondary side at candidates."""
         nodal_normals = config.deformed(self.secondary, self.points).nodal_normals
-        normal = np.einsum("nk,nkd->nd", candidates.shape, nodal_normals[self.number_on_side[candidates.nodes]])
-        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
+        at_nodes = nodal_normals[self.number_on_side[candidates.nodes]]
+        return unit_vectors(np.einsum("nk,nkd->nd", candidates.shape, at_nodes))
 
     def slip_at_rest(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration

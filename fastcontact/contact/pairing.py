@@ -31,6 +31,7 @@ from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import rows_of
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Largest overhang, in facet lengths, at which a point is still paired with a facet end where the surface continues smoothly,
@@ -242,7 +243,7 @@ def _round_edges(primary: DeformedSide, facet: Indices, xi: Array, mean: Array) 
     normals = interpolate(primary.facet_normals[facet], facet_points(primary.surface, facet, xi))
     weight = np.clip(1.0 - distance_from_edges(primary.surface, facet, xi) / ROUNDED_FRACTION, 0.0, 1.0)[:, None]
     normal = weight * mean + (1.0 - weight) * normals
-    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+    return unit_vectors(normal)
 
 
 def _with_overhang(pairing: Pairing, candidates: Array, primary: DeformedSide, overhangs: Mask) -> Pairing:
@@ -322,8 +323,7 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     slope = np.divide(normal @ axis, scale, out=np.zeros(len(normal)), where=scale > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)
     # Where the normal and the mean normal are opposite up to round-off, the tangent is not yet perpendicular to the normal.
-    first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    first = unit_vectors(first - np.einsum("nd,nd->n", first, normal)[:, None] * normal)
     second = np.cross(normal, first)
     if held is not None:  # the principal axis of the projector in the tangent plane
         pairs = (first, first), (first, second), (second, second)

@@ -17,6 +17,7 @@ from fastcontact.contact.projection import CORNER, DeformedSide, closest
 from fastcontact.contact.surface import FacetBlock, Surface, by_block
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Largest reference coordinate at which a facet is cut where the primary side ends. If the cut is nearer to the end of the
@@ -66,7 +67,7 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     """Return the unit normals (n, 2) of a block at integration points, for nodal `coordinates` (n_points, 2)."""
     gradient = elements.get(block.element).gradient(points.xi[:, None])[:, :, 0]
     tangent = np.einsum("nk,nkd->nd", gradient, coordinates[block.facets[points.facet]])
-    return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
+    return unit_vectors(np.column_stack([tangent[:, 1], -tangent[:, 0]]))
 
 
 def _opposite_nodes(block: FacetBlock, deformed_primary: DeformedSide) -> tuple[Indices, Array]:

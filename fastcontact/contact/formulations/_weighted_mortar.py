@@ -46,7 +46,8 @@ from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements
-from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
+from fastcontact.mesh.area_vectors import unit_vectors
+from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 MULTIPLIERS = ("standard", "dual")
 
@@ -377,8 +378,7 @@ class WeightedMortar(Formulation):
         """
         direction = normal
         if not isinstance(self.primary, RigidSide):
-            direction = normal - config.deformed(self.secondary, self.points).nodal_normals
-            direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
+            direction = unit_vectors(normal - config.deformed(self.secondary, self.points).nodal_normals)
         cosine = np.einsum("nd,nd->n", normal, direction)
         gap = np.where(constraints.usable & (cosine > 0.0), constraints.gaps(config.start), 0.0)
         return gap / np.where(cosine > 0.0, cosine, 1.0), direction
@@ -518,8 +518,7 @@ class WeightedMortar(Formulation):
         length, overall = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)
         if np.linalg.norm(overall) <= LENGTH_ROUND_OFF * length.sum():
             overall = np.eye(len(overall))[-1]
-        mean = np.where(length > 0.0, mean, overall)
-        return mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        return unit_vectors(np.where(length > 0.0, mean, overall))
 
     def _clearance(self, D: csr_array, M: csr_array, weight: Array) -> Array:
         """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""
