@@ -44,7 +44,7 @@ def line_points(
     """
     n = len(block.facets)
     ends = np.tile(np.arange(n), 2), np.repeat([-1.0, 1.0], n)
-    cuts = ends, _opposite_nodes(block, primary), borders, _opposite_ends(block, primary, tolerance)
+    cuts = ends, _opposite_nodes(block, primary), borders, opposite_ends(block, primary, tolerance)
     facet, xi = map(np.concatenate, zip(*cuts, strict=True))
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
@@ -103,7 +103,7 @@ def _signed_distances(points: Array, origin: Array, normal: Array) -> Array:
     return np.asarray(offset[..., 0] * normal[..., None, 1] - offset[..., 1] * normal[..., None, 0])
 
 
-def _opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> tuple[Indices, Array]:
+def opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> tuple[Indices, Array]:
     """Return the points of a block on the normals at the ends of the primary side, as facets and reference coordinates."""
     side, deformed = primary.surface, primary.coordinates
     # A tolerance of the order of round-off does not extend the side, because the cut would leave a sliver of this width.
@@ -124,11 +124,6 @@ def _opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -
     facet, xi = np.concatenate(facets), np.concatenate(coordinates)
     is_inside = np.abs(xi) < LARGEST_CUT
     return facet[is_inside], xi[is_inside]
-
-
-def facets_at_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> Indices:
-    """Return the facets of a block inside which the primary side, or the side of one of several bodies, ends."""
-    return _opposite_ends(block, primary, tolerance)[0]
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:

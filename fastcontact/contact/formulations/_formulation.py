@@ -82,6 +82,9 @@ class Formulation(ContactSides, ABC):
     allows_obstacles: ClassVar[bool] = True
     # Whether each node has one gap, which is weighted over the adjacent facets.
     weighs_gaps: ClassVar[bool] = False
+    # Whether gaps between bodies are linearised at the mean of the displacements at which the sides were paired and of the
+    # solution, which reduces the error of a Newton step. Otherwise, they are linearised at the former.
+    linearised_at_mean: ClassVar[bool] = False
 
     @property
     def eliminable(self) -> bool:
@@ -254,14 +257,6 @@ class Formulation(ContactSides, ABC):
             options["geometry"] = partial(self._linearised_points, candidates, pairing, config, directions, compliance)
         return Constraints(B, gap0, candidates.positions(self.points), compliance and compliance[0], **options)
 
-    @property
-    def linearised_at_mean(self) -> bool:
-        """Whether gaps are linearised at the mean of the displacements at which the sides were paired and of the solution.
-
-        This reduces the error of a Newton step. Otherwise, they are linearised at the former.
-        """
-        return False
-
     def _linearised_points(
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array],
         compliance: PointCompliance | None, multiplier: Array, tangential: Array, displacement: Array,
@@ -273,11 +268,12 @@ class Formulation(ContactSides, ABC):
         The last three arguments are those of `Geometry`.
         """
         rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
-        if self.linearised_at_mean:
+        at_mean = self.linearised_at_mean and isinstance(self.primary, Surface)
+        if at_mean:
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.pair_candidates(candidates, config, np.inf)
         points = self.linearised_points(candidates, pairing, rows, config, self.normals)
-        if self.linearised_at_mean:
+        if at_mean:
             points.offset = points.offset + points.motion @ (displacement - config.displacement)
         arguments = self.secondary, points, None, points.normal, multiplier[rows]
         linearised = LinearisedPoints(*arguments, rows_in_pair=(rows, len(multiplier)))

@@ -29,7 +29,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Linearised, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
-from fastcontact.contact.formulations._cut_lines import facets_at_ends, line_overlap
+from fastcontact.contact.formulations._cut_lines import line_overlap, opposite_ends
 from fastcontact.contact.formulations._dual_basis import SMALL_FRACTION, SMALL_INTEGRAL, dual_functions, positive_basis
 from fastcontact.contact.formulations._finite_differences import FiniteDifferences
 from fastcontact.contact.formulations._formulation import Formulation
@@ -303,7 +303,7 @@ class WeightedMortar(Formulation):
         if isinstance(self.primary, RigidSide) or self.points.shape[1] == 3:
             return isinstance(self.primary, Surface)
         primary, tolerance = config.deformed(self.primary, self.points), self.projection_tolerance or 0.0
-        ends = ((block.local, facets_at_ends(block, primary, tolerance)) for block in self.secondary.blocks)
+        ends = ((block.local, opposite_ends(block, primary, tolerance)[0]) for block in self.secondary.blocks)
         return any(multiplier[local[facets]].any() for local, facets in ends)
 
     def _linearised_points_of_overlap(
