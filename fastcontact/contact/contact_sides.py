@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.held_motions import HeldMotions, reflected, symmetry_planes
-from fastcontact.contact.linearised_projections import Points, paired_points
+from fastcontact.contact.linearised_projections import ObstaclePoints, Points, SurfacePoints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import (
@@ -31,7 +31,7 @@ from fastcontact.contact.projection import SMALL_OVERHANG, interpolate
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.errors import ContactError, unknown
-from fastcontact.linear.sparse_rows import rows_of
+from fastcontact.linear.sparse_rows import rows_of, shapes_at
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -211,15 +211,22 @@ class ContactSides:
         self, candidates: Candidates, pairing: Pairing, rows: Indices, config: Configuration, normals: object,
         closest: bool = False,
     ) -> Points:  # fmt: skip
-        """Return the `paired_points` of the candidates with the numbers `rows` (n,), opposite smooth surfaces."""
-        slope, smoothing = None, self.smoothing
+        """Return the linearised projections of the candidates with the numbers `rows` (n,) onto the primary side.
+
+        They refer to smooth surfaces, if these are used. `normals` and `closest` apply to meshed primary sides, see
+        `SurfacePoints`.
+        """
+        if isinstance(self.primary, RigidSide):
+            shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(self.points))
+            return ObstaclePoints(shapes, self.primary, self.points + config.displacement, config.pose)
+        slope, smoothing, primary = None, self.smoothing, config.deformed(self.primary, self.points)
         if smoothing is not None:
             axes = smoothing.frames(self.points + config.displacement)
             factor = smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
             slope = factor * smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
             if pairing.beyond is not None:  # The extensions of facets are straight.
                 slope = np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
-        return paired_points(candidates, pairing, rows, self.primary, self.points, config, normals, closest, slope)
+        return SurfacePoints(candidates, pairing, rows, primary, normals, closest, slope)
 
     def rigid_motion(self, positions: Callable[[Array], Array], config: Configuration) -> Array:
         """Return the displacements (n, dim) in the step of the obstacle points opposite to n points [length].

@@ -126,7 +126,7 @@ class _Problem:
 
     def gaps(self, y: Array) -> Array:
         """Return gaps and slips (1 + k, m) for forces y (1 + k, m)."""
-        return self.free + gap_changes(self.F, y, self.components)
+        return self.free + scattered(self.F @ y.ravel()[self.components], self.components, self.free.shape)
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised`."""
@@ -174,11 +174,6 @@ class _Problem:
             else:
                 compliance, halvings = float(np.sqrt(compliance * last)), halvings + 1
         return y
-
-
-def gap_changes(F: Delassus, y: Array, components: Indices) -> Array:
-    """Return the gaps and slips (1 + k, q) due to forces y (1 + k, q), where F couples the `components`."""
-    return scattered(F @ y.ravel()[components], components, y.shape)
 
 
 def scattered(values: Array, at: Indices, shape: tuple[int, ...]) -> Array:

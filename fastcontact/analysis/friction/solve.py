@@ -21,7 +21,7 @@ from fastcontact._tools.records import record, replace
 from fastcontact.analysis.friction import delassus, dense, eliminated
 from fastcontact.analysis.friction.cone_newton import SLIP_COMPLIANCE, Law, aligning_rotation, held_tangents, rotated
 from fastcontact.analysis.friction.delassus import Delassus
-from fastcontact.analysis.friction.dense import gap_changes, numbers_at, scattered
+from fastcontact.analysis.friction.dense import numbers_at, scattered
 from fastcontact.analysis.solution import (
     Accuracy,
     FrictionSolution,
@@ -203,6 +203,10 @@ class _IncludedProblem:
     held_slips: Mask
     Q: csr_array | None
 
+    def _gap_changes(self, y: Array) -> Array:
+        """Return the gaps and slips (1 + k, q) due to forces y (1 + k, q)."""
+        return scattered(self.F @ y.ravel()[self.components], self.components, y.shape)
+
     def in_increments(
         self, y0: Array, closing: Array, waiting: Mask
     ) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array, float]]:
@@ -211,7 +215,7 @@ class _IncludedProblem:
         `y0` and `closing` (1 + k, q) are those of `LoadPath.along`, rotated by Q.
         """
         y0[1:][self.held_slips], closing[1:][self.held_slips] = 0.0, 0.0
-        lag = -self.free - gap_changes(self.F, y0, self.components)
+        lag = -self.free - self._gap_changes(y0)
         lag[0] += closing[0]
         return in_increments(lag, closing, y0, waiting, self._increment)
 
@@ -224,8 +228,7 @@ class _IncludedProblem:
         result = dense.solve(F, gaps[:, rows], self.mu[rows], closed[rows], start, self.equality[rows], components)
         y, (closed, sticking) = np.zeros_like(gaps), np.zeros((2, len(carrying)), bool)
         y[:, rows], closed[rows], sticking[rows] = result.y, result.closed, result.sticking
-        gaps = gaps + gap_changes(self.F, y, self.components)
-        return replace(result, y=y, gaps=gaps, closed=closed, sticking=sticking)
+        return replace(result, y=y, gaps=gaps + self._gap_changes(y), closed=closed, sticking=sticking)
 
     def response(self, loaded: Loaded, R: csr_array, row_numbers: Indices, result: FrictionSolution) -> Response:
         """Return the `Response` of the solution `result`; for R (n, n_unknowns) and `row_numbers` see `solution.response`."""
