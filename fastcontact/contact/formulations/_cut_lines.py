@@ -17,6 +17,7 @@ from fastcontact.contact.projection import CORNER, DeformedSide, closest
 from fastcontact.contact.surface import FacetBlock, Surface, by_block
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Largest reference coordinate at which a facet is cut where the primary side ends. If the cut is nearer to the end of the
@@ -43,7 +44,7 @@ def line_points(
     """
     n = len(block.facets)
     ends = np.tile(np.arange(n), 2), np.repeat([-1.0, 1.0], n)
-    cuts = ends, _opposite_nodes(block, primary), borders, _opposite_ends(block, primary, tolerance)
+    cuts = ends, _opposite_nodes(block, primary), borders, opposite_ends(block, primary, tolerance)
     facet, xi = map(np.concatenate, zip(*cuts, strict=True))
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
@@ -66,7 +67,7 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     """Return the unit normals (n, 2) of a block at integration points, for nodal `coordinates` (n_points, 2)."""
     gradient = elements.get(block.element).gradient(points.xi[:, None])[:, :, 0]
     tangent = np.einsum("nk,nkd->nd", gradient, coordinates[block.facets[points.facet]])
-    return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
+    return unit_vectors(np.column_stack([tangent[:, 1], -tangent[:, 0]]))
 
 
 def _opposite_nodes(block: FacetBlock, primary: DeformedSide) -> tuple[Indices, Array]:
@@ -102,7 +103,7 @@ def _signed_distances(points: Array, origin: Array, normal: Array) -> Array:
     return np.asarray(offset[..., 0] * normal[..., None, 1] - offset[..., 1] * normal[..., None, 0])
 
 
-def _opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> tuple[Indices, Array]:
+def opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> tuple[Indices, Array]:
     """Return the points of a block on the normals at the ends of the primary side, as facets and reference coordinates."""
     side, deformed = primary.surface, primary.coordinates
     # A tolerance of the order of round-off does not extend the side, because the cut would leave a sliver of this width.
@@ -123,11 +124,6 @@ def _opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -
     facet, xi = np.concatenate(facets), np.concatenate(coordinates)
     is_inside = np.abs(xi) < LARGEST_CUT
     return facet[is_inside], xi[is_inside]
-
-
-def facets_at_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> Indices:
-    """Return the facets of a block inside which the primary side, or the side of one of several bodies, ends."""
-    return _opposite_ends(block, primary, tolerance)[0]
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:
