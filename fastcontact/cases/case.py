@@ -376,10 +376,12 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list
 
 
 def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
-    """Return the mesh of the table ``[mesh]``, from a file or a generator."""
+    """Return the mesh of the table ``[mesh]``, from a file, several files that are joined, or a generator."""
     if "file" in data:
-        check_keys("mesh", data, {"file": str, "name": str})
-        return read_mesh(folder / data["file"], mesh_name=data.get("name"))
+        check_keys("mesh", data, {"file": (str, list), "name": str})
+        if isinstance(data["file"], str):
+            return read_mesh(folder / data["file"], mesh_name=data.get("name"))
+        return _joined(folder, data["file"], data.get("name"))
     if "generator" not in data:
         raise CaseError("'mesh' needs either the key 'file' or the key 'generator'")
     from fastcontact.mesh.generate import GENERATORS
@@ -388,6 +390,23 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     check_known("mesh.generator", name, GENERATORS, CaseError)
     arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items() if key != "generator"}
     return call_with_keys("mesh", GENERATORS[name], arguments)
+
+
+def _joined(folder: Path, files: list[Any], name: str | None) -> Mesh:
+    """Return the union of the meshes in several files. Raises CaseError if two of them have a group of the same name."""
+    from fastcontact.mesh.generate import union
+
+    if not files or not all(isinstance(file, str) for file in files):
+        raise CaseError(f"'mesh.file' must be a path or a list of paths, not {files!r}")
+    meshes, file_of = [read_mesh(folder / file, mesh_name=name) for file in files], dict[str, str]()
+    for file, mesh in zip(files, meshes, strict=True):
+        for group in {**mesh.cell_groups, **mesh.point_groups}:
+            if group in file_of:
+                raise CaseError(
+                    f"mesh.file: '{file_of[group]}' and '{file}' both have a group '{group}': rename one of them"
+                )
+        file_of |= dict.fromkeys({**mesh.cell_groups, **mesh.point_groups}, file)
+    return union(*meshes)
 
 
 def _ramp(data: dict[str, Any]) -> Ramp:

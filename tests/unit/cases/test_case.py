@@ -10,6 +10,8 @@ from refusals import refused
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
+from fastcontact.cli.cases import copy_case
+from fastcontact.mesh.generate import block, renamed
 
 SOLVE = '[solve]\nlinear_solver = "direct"\ngeometry_updates = 2\n'
 CHECK = '[[check]]\nquantity = "C1.stress.yy"\ntheory = "hertz"\ntolerance = 0.05\n'
@@ -306,3 +308,39 @@ def test_what_has_none_says_why(folder, capsys):
 )
 def test_what_is_refused_before_numerics(folder, asked, message):
     refused(fc.FastcontactError, message, read_case, written(folder, asked))
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ('["lower.med", "upper.med"]', None),
+        (
+            '["lower.med", "again.med"]',
+            "'lower.med' and 'again.med' both have a group 'LOWER_\\w+': rename one of them",
+        ),
+        ("[]", "'mesh.file' must be a path or a list of paths"),
+        ('["lower.med", 3]', "'mesh.file' must be a path or a list of paths"),
+    ],
+)
+def test_several_mesh_files_are_joined(files, words, write, tmp_path):
+    lower = renamed(block((1.0, 1.0), (2, 2)), lambda group: f"LOWER_{group}")
+    upper = renamed(block((1.0, 1.0), (2, 2), origin=(0.0, 1.0)), lambda group: f"UPPER_{group}")
+    for name, mesh in (("lower", lower), ("upper", upper), ("again", lower)):
+        fc.write_mesh(tmp_path / f"{name}.med", mesh)
+    text = (
+        f'kinematics = "plane_strain"\n[mesh]\nfile = {files}\n[[material]]\nE = 1000.0\nnu = 0.0\n'
+        '[[support]]\ngroup = "LOWER_BOTTOM"\nx = 0.0\ny = 0.0\n[[support]]\ngroup = "UPPER_LEFT"\nx = 0.0\n'
+        '[[pressure]]\ngroup = "UPPER_TOP"\nvalue = 2.0\n'
+        '[contact.joint]\nsecondary = "UPPER_BOTTOM"\nprimary = "LOWER_TOP"\n[ramp]\nsteps = 1\n'
+    )
+    path = write(text)
+    if words:
+        refused(fc.CaseError, words, read_case, path)
+        return
+    case = read_case(path)
+    assert case.mesh.n_points == lower.n_points + upper.n_points
+    assert fc.solve(case.model, case.ramp)[-1].contact["joint"].pressure == pytest.approx(2.0)
+    (tmp_path / "copy").mkdir()
+    copied = copy_case(path, tmp_path / "copy/c.toml")
+    assert [file.name for file in copied] == ["c.toml", "lower.med", "upper.med"]
+    assert read_case(copied[0]).mesh.n_points == case.mesh.n_points
