@@ -319,6 +319,10 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     mean = mean / length if length > LENGTH_ROUND_OFF * len(normal) else np.array([0.0, 0.0, 1.0])
     axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
     axis /= np.linalg.norm(axis)
+    if held is not None:  # otherwise the sign of the principal axes below could be round-off
+        in_plane = np.eye(3) - np.outer(mean, mean)
+        size, vectors = np.linalg.eigh(in_plane @ held.sum(axis=0) @ in_plane)
+        axis = vectors[:, -1] if size[-1] > LENGTH_ROUND_OFF * len(held) else axis
     # Rotate the axis by the rotation from the mean normal to the normal. If these are opposite, the axis stays unchanged.
     scale = 1.0 + normal @ mean
     slope = np.divide(normal @ axis, scale, out=np.zeros(len(normal)), where=scale > LENGTH_ROUND_OFF)
