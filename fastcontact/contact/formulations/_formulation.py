@@ -161,7 +161,9 @@ class Formulation(ContactSides, ABC):
             from fastcontact.contact.fluid_pressure import AreaVectors, with_fluid_pressure
 
             areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
-            constraints = with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
+            source, primary = self.options.source[self.secondary.points], self.primary
+            facets = primary if isinstance(primary, Surface) else None
+            constraints = with_fluid_pressure(constraints, config, areas, source, facets)
         return constraints if config.wear is None else config.wear.added_to(constraints)
 
     def _with_penalties(self, constraints: Constraints, config: Configuration) -> Constraints:

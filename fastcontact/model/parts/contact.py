@@ -219,10 +219,11 @@ class ModelContact(ModelConnections):
         """Apply a fluid pressure to both sides of a contact pair, wherever the fluid can penetrate from a source.
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where the contact
-        pressure does not exceed the fluid pressure. There it acts along the normals of the secondary side and, on the
-        primary side, along the normal of the gap. At finite strain these are the normals of the deformed surfaces. The
-        pressure at each secondary node is the attribute ``fluid_pressure`` of the contact result. To apply the pressure
-        of the fluid to other surfaces, use `add_pressure`.
+        pressure does not exceed the fluid pressure. There it acts on each side along the normals of this side and over
+        its own area; on the primary side this is the part that faces the wetted part of the secondary side. At finite
+        strain, normals and areas are those of the deformed surfaces. The pressure at each secondary node is the attribute
+        ``fluid_pressure`` of the contact result. To apply the pressure of the fluid to other surfaces, use
+        `add_pressure`.
 
         Parameters
         ----------
