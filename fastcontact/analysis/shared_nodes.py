@@ -179,7 +179,10 @@ def _at_periodic_interfaces(
     usable[behind] = False
     pairs = [np.empty((2, 0), np.intp)]
     for name, rows in constraints.rows.items() if interfaces else ():
-        branches, largest_node = constraints.parts[name].branches, max(int(end.max()) for i in interfaces for end in i[:2])
+        branches, largest_node = (
+            constraints.parts[name].branches,
+            max(int(end.max()) for i in interfaces for end in i[:2]),
+        )
         # A cohesive layer has one equation for the opening and one for each slip at each node.
         n_equations = 1 if branches is None else (rows.stop - rows.start) // len(branches)
         for block in np.split(np.arange(rows.start, rows.stop), n_equations):
