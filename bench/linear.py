@@ -47,9 +47,9 @@ def timed(work: Any) -> tuple[Any, float, float]:
 def triad() -> float:
     """Return the memory bandwidth of a core [GB/s], the median of nine operations ``p = z + beta p`` on long vectors."""
     z, p = np.ones(20_000_000), np.ones(20_000_000)
-    krylov_kernels.turn(0, len(p), 0.5, z, p)
+    krylov_kernels.direction(0, len(p), 0.5, z, p)
     return float(
-        np.median([24e-9 * len(z) / timed(lambda: krylov_kernels.turn(0, len(p), 0.5, z, p))[1] for _ in range(9)])
+        np.median([24e-9 * len(z) / timed(lambda: krylov_kernels.direction(0, len(p), 0.5, z, p))[1] for _ in range(9)])
     )
 
 

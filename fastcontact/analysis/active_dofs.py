@@ -22,9 +22,9 @@ from fastcontact.round_off import SINGLE_PRECISION
 class ActiveDofs:
     """Degrees of freedom of the contact problem.
 
-    The contact problem is solved for the active components of the displacements. For displacements `lift` (n,) that supports
-    and multi-point constraints prescribe if all unknowns are zero, they are ``lift[active] + T @ v``, where v (l,) are the
-    active unknowns [length].
+    The contact problem is solved for the active components of the displacements, ``lift[active] + T @ v``. Here v (l,) are
+    the active unknowns, and `lift` (n,) are the displacements that supports and multi-point constraints prescribe if all
+    unknowns are zero [length].
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ class ActiveDofs:
     springs : ndarray of int
         Components to which the springs of floating bodies are attached.
     unknowns : ndarray of int (l,), optional
-        Unknowns on which these components depend, in ascending order, see `System.involved`: the active unknowns after static
-        condensation. The active components are then `contact` and `springs`. Without condensation, all components and
-        all unknowns are active.
+        Unknowns on which the components `contact` and `springs` depend, in ascending order, see `System.involved`: the active
+        unknowns after static condensation. The active components are then `contact` and `springs`. Without condensation,
+        all components and all unknowns are active.
 
     Attributes
     ----------
@@ -47,8 +47,8 @@ class ActiveDofs:
     contact : ndarray of int
         Positions, among the active components, of those that contact constraints may involve.
     determined : ndarray of int
-        Positions, among the active components, of those with contact or springs, which solutions of the contact problem
-        determine.
+        Positions, among the active components, of those with contact or springs. A Newton step for the contact geometry
+        changes only these.
     springs : ndarray of int
         Positions of the components with springs, which are unknowns, among the active unknowns.
     T, transpose : csr_array (k, l), csr_array (l, k)
@@ -83,12 +83,12 @@ class ActiveDofs:
         """
         rows, offsets = [], np.vstack([constraints.gap0, constraints.slip0])
         shape = len(constraints), len(self.unknowns)
-        least = np.full((1 + len(constraints.tangents), len(constraints)), NOTABLE)
-        least[0, constraints.softness > 0.0] = SINGLE_PRECISION
+        threshold = np.full((1 + len(constraints.tangents), len(constraints)), NOTABLE)
+        threshold[0, constraints.softness > 0.0] = SINGLE_PRECISION
         for k, R in enumerate((constraints.B, *constraints.tangents)):
             reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
             active = csr_array((reduced.data, self._numbers[reduced.indices], reduced.indptr), shape=shape)
-            rows.append(without_round_off(active, R, least[k]))
+            rows.append(without_round_off(active, R, threshold[k]))
         prescribed = constraints.usable & (constraints.softness > 0.0) & (np.diff(rows[0].indptr) == 0)
         tangents, slip0 = tuple(rows[1:]), offsets[1:]
         return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tangents, slip0=slip0, prescribed=prescribed)

@@ -6,15 +6,15 @@ gap is ``gap0 + B u + C multiplier``. C is the compliance of the constraints the
 semidefinite; it is zero in most formulations.
 
 The primal-dual active set method (Hintermueller, Ito and Kunisch, 2003) changes the status of all constraints with wrong
-signs at once. It usually converges after a few linear solutions, but it can cycle. If the constraints are linearly
+signs at once. It usually converges after a few linear solutions, but active sets may recur. If the constraints are linearly
 independent, ``B K^-1 B.T + C`` is symmetric positive definite, and the linear complementarity problem has a P-matrix.
-When a set recurs, the solver therefore continues with the least-index rule: it only changes the wrong constraint with the
-lowest number. No set is then repeated, and the method terminates (Murty, 1974).
+When a set recurs, the method therefore continues with the least-index rule: it changes only the constraint with the lowest
+number among those with wrong signs. No set is then repeated, and the method terminates (Murty, 1974).
 
-An iterative linear solver need not converge for a set that will change anyway. It is therefore monitored, and stopped as
-soon as gaps or multipliers with wrong signs exceed the error that is estimated from its residual. The method still
-terminates, because each constraint changes in this way at most once: a second change would contradict the first and shows
-that the error is larger than estimated. A set is accepted as final only if the linear solution has converged.
+An iterative linear solver need not converge for a set that will change anyway. The solver is therefore monitored, and
+stopped as soon as gaps or multipliers with wrong signs exceed the error that is estimated from its residual. The method still
+terminates, because each constraint changes in this way at most once: a second change would contradict the first, which
+shows that the error is larger than estimated. A set is accepted as final only if the linear solution has converged.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def solve(
     active : ndarray of bool (m,)
         Initial active set.
     accuracy : Accuracy
-        Tolerances of the signs, and the largest number of iterations.
+        Tolerances of gaps and multipliers, and the largest number of iterations.
     guess : ndarray (n,), optional
         Initial guess of the unknowns, for iterative solvers [length].
 
@@ -59,29 +59,29 @@ def solve(
     active = (active & constraints.usable) | equations
     earlier_sets: set[bytes] = set()
     changed = np.zeros(len(active), bool)  # constraints that a monitored, unconverged solution has changed
-    least_index, iteration, wanted = False, 1, None
+    least_index, iteration, next_active = False, 1, None
 
     def monitor(u: Array, forces: Array, error: float) -> bool:
-        """Return whether signs beyond the relative `error` of the unconverged solution require a different set.
+        """Return whether the unconverged solution, of relative `error`, shows that another active set is needed.
 
         A set that would undo an earlier change of one of the constraints `changed` is ignored.
         """
-        nonlocal wanted
+        nonlocal next_active
         estimate = _with_next_set(constraints, accuracy, equations, u, forces, active, error)
         changes_again = (estimate.wanted != active) & changed
-        wanted = None if estimate.settled or changes_again.any() else estimate.wanted
-        return wanted is not None
+        next_active = None if estimate.settled or changes_again.any() else estimate.wanted
+        return next_active is not None
 
     while True:
-        rows, compliance, wanted = np.flatnonzero(active), constraints.normal_compliance, None
+        rows, compliance, next_active = np.flatnonzero(active), constraints.normal_compliance, None
         C = None if compliance is None else compliance.block_operator(rows)
         nodes = None if constraints.nodes is None else constraints.nodes[rows]
         B, values = constraints.B[rows], -constraints.gap0[rows]
         u, forces = loaded.solve(B, values, C, guess, monitor, accuracy.residual, nodes)
         guess = u
-        if wanted is not None:
-            changed |= active != wanted
-            active = wanted
+        if next_active is not None:
+            changed |= active != next_active
+            active = next_active
             continue
         solution = _with_next_set(constraints, accuracy, equations, u, forces, active)
         if solution.settled or iteration == accuracy.max_iterations:
@@ -132,5 +132,5 @@ def _with_next_set(
         gap += compliance.apply(multiplier)
     tension_bound = max(accuracy.multiplier, error) * np.abs(forces).max(initial=0.0)
     gap_bound = max(accuracy.gap, error * np.abs(u).max(initial=0.0)) if error else accuracy.gap
-    wanted = np.where(active, multiplier > -tension_bound, gap < -gap_bound) & constraints.usable | equations
-    return Solution.frictionless(u, multiplier, gap, active, wanted)
+    next_active = np.where(active, multiplier > -tension_bound, gap < -gap_bound) & constraints.usable | equations
+    return Solution.frictionless(u, multiplier, gap, active, next_active)

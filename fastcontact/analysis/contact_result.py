@@ -142,17 +142,17 @@ def contact_result(
 
 
 def _radius_in_facets(pair: Formulation, place: Array, zone: Mask, low: float, high: float) -> tuple[float, float]:
-    """Return the bounds of the radius of the contact or stick zone in 3D, given `low` and `high` without facets [length].
+    """Return bounds of the radius of the contact or stick zone in 3D, given the bounds `low` and `high` from nodes [length].
 
-    The radius may depend on the direction, and facets of nodes of the `zone` (n_nodes,) may lie only partly in it. `place`
-    (n_nodes,) are the distances of the nodes from the middle [length]. The bounds of a ring are not changed.
+    The edge of the `zone` (n_nodes,) need not be a circle, and it crosses the facets that connect the zone with other nodes.
+    `place` (n_nodes,) are the distances of the nodes from the middle [length]. The bounds of a ring are not changed.
     """
     if not zone[place.argmin()]:
         return low, high
     side = pair.secondary
-    free = ~zone & ~pair.excluded[side.points]
-    low = min(low, float(place[zone & (side.node_adjacency @ free > 0)].min(initial=np.inf)))
-    return low, max(high, float(place[free & (side.node_adjacency @ zone > 0)].max(initial=0.0)))
+    outside = ~zone & ~pair.excluded[side.points]
+    low = min(low, float(place[zone & (side.node_adjacency @ outside > 0)].min(initial=np.inf)))
+    return low, max(high, float(place[outside & (side.node_adjacency @ zone > 0)].max(initial=0.0)))
 
 
 def _nodal_forces(
@@ -211,8 +211,8 @@ def _closed_nodes(
         The pressure field over the whole side [pressure].
     scale : ndarray (n_nodes,)
         Ratio of the reported pressures to the pressures of the formulation at closed nodes, by which tractions are scaled as
-        well; zero at open nodes. If the formulation has negative pressures anywhere, the ratio is at most 1, since its
-        pressure at a node may then nearly vanish [-].
+        well; zero at open nodes. If the formulation has negative pressures anywhere, the ratio is at most 1, since the
+        pressure of the formulation at a node may then nearly vanish [-].
     """
     field, excluded = constraints.nodal_field, pair.excluded[pair.secondary.points]
     forces = constraints.normal_forces(constraints.contact_forces(multiplier))
@@ -315,7 +315,7 @@ def _nodal_shear(
 def _within_cone(constraints: Constraints, shear: Array, pressure: Array, normal: Array, side: Surface) -> Array:
     """Return nodal shear (n, dim) that satisfies Coulomb's law with the nodal pressures (n,) [pressure].
 
-    The constraints satisfy it, but a projection onto nodal values does not preserve inequalities, and the normals of the
+    The constraints obey this law, but a projection onto nodal values does not preserve inequalities, and the normals of the
     constraints differ from those of the nodes. As in `closed_node_pressures`, the excess over the limit is moved to the
     nearest nodes that can carry it, which preserves the resultant.
     """
@@ -335,8 +335,8 @@ def _within_cone(constraints: Constraints, shear: Array, pressure: Array, normal
 def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows: slice, result: ContactResult) -> Array:
     """Return the part (n_nodes, dim) of the nodal slips in this step that precedes the closing of the nodes [length].
 
-    It is a mean over the constraints near each node, weighted by their contact forces, if the step was solved in increments.
-    For parameters see `contact_result`.
+    The step must have been solved in increments. The slip at a node is a mean over nearby constraints, weighted by their
+    contact forces. For parameters see `contact_result`.
     """
     assert solution.slip_before_closing is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
@@ -402,7 +402,7 @@ def areas(pair: Formulation, displacement: Array) -> tuple[Array, Array]:
 def _stretch(contact: ContactResult, displacement: Array, before: Array, after: Array) -> tuple[float, float]:
     """Return the ratios of the deformed to the undeformed contact width, for both bounds of the width [-].
 
-    In 3D both are the square root of the area ratio of the closed nodes, and without a tangent in plane models this ratio.
+    In 3D both are the square root of the area ratio of the closed nodes, in plane models without a tangent the ratio itself.
     """
     if not contact.active.any():
         return 1.0, 1.0
@@ -416,9 +416,9 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
 
 
 def _with_periodic_nodes(pair: Formulation, contact: ContactResult) -> ContactResult:
-    """Return a contact result in which both nodes of a periodic pair have the same traction and contact status.
+    """Return a contact result in which corresponding nodes at periodic ends have the same traction and contact status.
 
-    If only one of the nodes has an opposite facet, because the sides slide past the ends, both have its gap.
+    If only one of the two nodes has an opposite facet, because the sides slide past the ends, both are given its gap.
     """
     areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
     pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()

@@ -76,7 +76,7 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
 
 
 def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> str:
-    """Return the message for loads that move `bodies`.
+    """Return the message for loads under which friction cannot hold `bodies`.
 
     To hold the bodies, the friction `coefficients` would have to be `factor` times as large.
     """
@@ -189,9 +189,9 @@ def first_points(mesh: Mesh, points: Sequence[int]) -> str:
 def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
     """Return the remedy for a bilateral pair whose initial gaps exceed round-off, since such pairs close gaps of any width.
 
-    Without such a pair, return remedies for pairs that may alternate at the edge of an obstacle, between facets at a node,
-    supports of dual functions, or branches of a law. Each remedy is for the first such pair in `nodes`, in which
-    displacements change most.
+    Without such a pair, return remedies for pairs whose constraints may alternate: at the edge of an obstacle, between facets
+    at a node, between supports of dual functions, or between branches of a cohesive law. Each remedy is for the first such
+    pair in `nodes`, in which displacements change most.
     """
     for name, pair in problem.pairs.items():
         if pair.options.kind == "bilateral":

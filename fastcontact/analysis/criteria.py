@@ -62,18 +62,18 @@ class Criteria:
         Largest number of active-set iterations for a pairing.
     max_halvings : int
         Number of times that a load step that does not converge is halved before the analysis stops (DECOUPE); zero means
-        never. With nonlinear bodies it is twice this number, and the size of substeps doubles after each one that took few
-        iterations. Substeps are complete load steps, so that friction follows their path, but only the instants of the ramp
-        have results; ``iterations["substeps"]`` lists the ends of the substeps.
+        never. With nonlinear bodies the limit is twice this number, and the size of substeps doubles after each one that took
+        few iterations. Substeps are complete load steps, so that friction follows their path, but only the instants of the
+        ramp have results; ``iterations["substeps"]`` lists the ends of the substeps.
     friction_while_touching : float, optional
         Load steps in which nodes close and carry more shear than this fraction of the coefficient of friction times the
-        normal forces are solved in increments that end where nodes close, with one Delassus operator and with the geometry
+        normal forces are solved in increments that end when nodes close, with one Delassus operator and with the geometry
         at the end of the step. Slip is then measured from the instant at which a node closes, otherwise from the beginning of
         the step. By default 0.001 in plane and axisymmetric models of linear bodies, at obstacles and between bodies with
         dual mortar multipliers, unless `geometry_updates` is given or only contact restrains a body; elsewhere 1, which
-        means that no step is divided. A step takes up to twice the time with the direct solver, more if some dozens of nodes
-        close in it, and many times the iterations with multigrid. With nonlinear bodies, steps are halved instead, at most
-        `max_halvings` times, as long as such nodes do more than this fraction of the frictional work so far [-].
+        means that no step is divided. A divided step takes up to twice the time with the direct solver, more if dozens of
+        nodes close in it, and many times as many iterations with multigrid. With nonlinear bodies, steps are halved instead,
+        at most `max_halvings` times, as long as such nodes do more than this fraction of the frictional work so far [-].
 
     Examples
     --------

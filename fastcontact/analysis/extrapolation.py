@@ -1,4 +1,4 @@
-"""Predictor of a load step: extrapolation in the load, of displacements by polynomials, of gaps and forces linearly."""
+"""Predictor of a load step: displacements are extrapolated by polynomials in the load, gaps and contact forces linearly."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Extrapolation:
     Attributes
     ----------
     ratios : tuple of float
-        Ratio of each load increment to the one before it, that of the current increment last; zero means that steps are not
-        extrapolated across it [-].
+        Ratio of each load increment to the increment before it, the current one last; zero where earlier steps must not be
+        extrapolated into this increment [-].
     degree : int
         Degree of the extrapolation polynomial.
     loads : tuple of tuples of ndarray
@@ -46,7 +46,7 @@ class Extrapolation:
         """Ratio of the current load increment to the last one; zero means no extrapolation [-]."""
         return self.ratios[-1] if self.ratios else 0.0
 
-    def to(self, *quantities: Array) -> Extrapolation:
+    def to_loads(self, *quantities: Array) -> Extrapolation:
         """Return the extrapolation to the loads of the next step.
 
         `quantities` are arrays of prescribed displacements [length] and of forces [force].
@@ -55,25 +55,25 @@ class Extrapolation:
         ratio = _increment_ratio(loads) if len(self.states) >= 2 else 0.0
         return replace(self, ratios=(*self.ratios[1 - MAX_DEGREE :], ratio), loads=loads)
 
-    def converged(self, u: Array, contact: Mapping[str, GapsAndForces], curve: bool = False) -> Extrapolation:
+    def after(self, u: Array, contact: Mapping[str, GapsAndForces], curved: bool = False) -> Extrapolation:
         """Return a copy to which the solution of a step is added.
 
-        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. If `curve` is
-        true, enough steps are stored for polynomials of more than the first degree. The degree is increased from 0 while the
-        polynomial of the next degree would have predicted this step better by the factor DECLINE. If this holds up to the
-        highest possible degree, the degree is one higher. It is at least 1.
+        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. If the load path is
+        `curved`, enough steps are stored for polynomials of more than the first degree. The degree increases from 0 as
+        long as the next degree would have predicted this step with less than DECLINE times the error. If the highest
+        possible degree is reached, the next step uses one more. The degree is at least 1.
         """
         degree, highest = 0, self._highest_degree
-        distances = [largest(u - self._polynomial_at_load(k)) for k in range(highest + 1)] if curve else []
+        distances = [largest(u - self._polynomial_at_load(k)) for k in range(highest + 1)] if curved else []
         while degree < len(distances) - 1 and distances[degree + 1] < DECLINE * distances[degree]:
             degree += 1  # without the factor DECLINE, indentations past yield take 5 % more iterations
         degree = max(1, degree + (degree == highest))
-        return replace(self, degree=degree, states=(*self.states[-MAX_DEGREE if curve else -1 :], (u.copy(), contact)))
+        return replace(self, degree=degree, states=(*self.states[-MAX_DEGREE if curved else -1 :], (u.copy(), contact)))
 
     def predicted(self, u: Array, degree: int | None = None) -> Array:
         """Return initial displacements (n,) of a step [length]; without extrapolation `u` (n,).
 
-        They are those of the polynomial of a given `degree`, by default of the chosen one.
+        The polynomial has the given `degree`, by default the attribute of this name.
         """
         degree = min(self.degree, self._highest_degree) if degree is None else degree
         return self._polynomial_at_load(degree) if self.ratio else u
@@ -91,7 +91,7 @@ class Extrapolation:
 
     @property
     def _highest_degree(self) -> int:
-        """Highest possible degree, negative without states: the number of last increments that are all extrapolated."""
+        """Highest possible degree: the number of last increments without a zero ratio, and at most that of states less 1."""
         n_extrapolated = next((k for k, ratio in enumerate(self.ratios[::-1]) if not ratio), len(self.ratios))
         return min(n_extrapolated, len(self.states) - 1)
 
@@ -146,7 +146,8 @@ class Extrapolation:
 def _increment_ratio(loads: tuple[tuple[Array, ...], ...]) -> float:
     """Return the ratio of the last increment of the loads to the one before it; zero if steps are not extrapolated.
 
-    It is that of the first of the `loads` of successive steps whose earlier increment is not zero.
+    `loads` are the quantities of three successive steps. The first quantity whose earlier increment is not zero determines
+    the ratio.
     """
     for first, second, third in zip(*loads) if len(loads) == 3 else ():
         increment, last_increment = third - second, second - first

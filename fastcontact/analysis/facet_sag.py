@@ -151,7 +151,7 @@ def _slope(pair: Formulation, points: Candidates, weights: Array, sag: Array, cl
 
 
 def _rule(pair: Formulation, element: str) -> quadrature.Rule:
-    """Return the points where the gap of a facet is evaluated, and their weights: its nodes for node-to-segment contact."""
+    """Return the points of a facet where the gap is evaluated, and their weights; its nodes for node-to-segment contact."""
     if pair.name == "node_to_segment":
         nodes = elements.get(element).nodes
         return nodes, np.ones(len(nodes))

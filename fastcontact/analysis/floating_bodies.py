@@ -255,10 +255,10 @@ class FloatingBodies:
     def with_soft_springs(self, loaded: Loaded, dofs: ActiveDofs, load: Array, slides: bool) -> SoftSprings:
         """Return the prepared matrix `loaded` with soft springs, given the generalised forces `load` (k,) [force].
 
-        If bodies may slide far, `slides`, the springs are so soft that their forces are negligible.
+        `slides` is whether bodies may slide far. The springs are then so soft that their forces are negligible.
         """
         stiffness = (SINGLE_PRECISION if slides else SOFT) * self.stiffness
-        modes = self._values_at_springs  # in terms of those with springs, which depend on the choice of nodes
+        modes = self._values_at_springs  # original modes by `motions`; they do not depend on the choice of nodes
         rigid = self._system.unknowns(self.motions.displacement)[dofs.unknowns]
         return SoftSprings(loaded, rigid @ modes, modes.T @ load, stiffness)
 
@@ -268,8 +268,8 @@ class FloatingBodies:
         Its keys are ``motions``, the free motions of bodies; ``springs``, the components to which springs are
         attached; ``spring_stiffness`` [force / length]; ``force_left``, the remaining force of each spring [force];
         ``relative_to_load``, the largest of these forces divided by `load` [-]; and ``positions``, the number of positions.
-        The load step adds ``undetermined``, the names of the motions that the method of this name returns, by body, and
-        ``moved``, the largest displacement of these bodies in the step [length].
+        The load step adds ``undetermined``, the motions that the method `undetermined` returns, by body, and ``moved``, the
+        largest displacement of these bodies in the step [length].
         """
         remaining = np.abs(rigid.spring_force)
         return {
@@ -286,10 +286,10 @@ class FloatingBodies:
     ) -> FreeMotions:
         """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step.
 
-        Any position without contact forces is then a solution. Contact forces of sides that just touch are round-off and are
-        ignored. Such forces are negligible compared with the force of a spring that is elongated by the largest
-        displacement and, if there are loads, also compared with these. Contact forces smaller than the out-of-balance
-        forces, which may be large with an iterative solver, are ignored, too.
+        Any position along these motions without contact forces is then a solution. Contact forces of sides that just touch
+        are round-off and are ignored: they are negligible compared with the force of a spring that is elongated by the
+        largest displacement and, if there are loads, also compared with the loads. Contact forces smaller than the
+        out-of-balance forces, which may be large with an iterative solver, are ignored, too.
 
         Parameters
         ----------

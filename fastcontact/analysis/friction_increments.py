@@ -28,8 +28,8 @@ class FrictionIncrements:
     Attributes
     ----------
     step : StepContext
-        If its geometry converges quadratically, the increments are solved once it has nearly converged, otherwise once it has
-        converged.
+        If Newton's method applies to the contact geometry, the increments are solved once the geometry has nearly converged,
+        otherwise once it has converged.
     due : bool
         Whether the next pairing is solved in increments.
     unfinished : bool
@@ -75,7 +75,7 @@ class FrictionIncrements:
     def _outdated(self, before: StackedConstraints, constraints: StackedConstraints, u: Array) -> bool:
         """Return whether the geometry has changed since the increments were solved, but by less than the last time.
 
-        Slips of earlier increments are those of the pairing in which they were solved.
+        The slips of the earlier increments belong to the pairing in which they were solved.
         """
         start = self.step.state.u
         if not (self._settled and self.step.problem.until_settled):
@@ -134,10 +134,10 @@ def _path(step: StepContext, constraints: StackedConstraints, nodes: SharedNodes
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
-    """Return the tangential relative displacements (m, dim) that close the gaps (m,) if normals are inclined [length].
+    """Return the tangential part (m, dim) of the relative displacements that close gaps (m,) along inclined normals [length].
 
-    They are not slip, see `LoadPath`. The constraints contain them as `slip0`, for the gaps of the last pairing at the
-    displacements at the beginning of the step. Here they are scaled to `gap`.
+    It is not slip, see `LoadPath`. The constraints contain it as `slip0`, for the gaps of the last pairing at the
+    displacements at the beginning of the step. Here it is scaled to `gap`.
     """
     closing = np.zeros_like(constraints.positions)
     for name, rows in constraints.rows.items():

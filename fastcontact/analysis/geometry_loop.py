@@ -98,9 +98,9 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
     if not problem.pairs:
         return None
     lift = step.load.lift if bodies is None else step.load.lift + bodies.rigid(u[bodies.dofs])
-    condensed = problem.system.unknowns(u, lift)
-    condensed[problem.dofs.unknowns] = 0.0
-    step = replace(step, loaded=step.loaded.condensed(), condensed_size=largest(condensed))
+    condensed_unknowns = problem.system.unknowns(u, lift)
+    condensed_unknowns[problem.dofs.unknowns] = 0.0
+    step = replace(step, loaded=step.loaded.condensed(), condensed_size=largest(condensed_unknowns))
     increments = FrictionIncrements(step)
     try:
         settled = _settle(step, iterate, increments, paired if step.linearises_contact else None)
@@ -299,10 +299,11 @@ class _Mixing:
     def _shortened_step(
         self, before: Array, image: Array, start: Array, step: Array, slope: float, fraction: float
     ) -> Array | None:
-        """Return a shorter Newton step if the last one, which ends at `before` (k,), is too long; None otherwise.
+        """Return the end (k,) of a shorter Newton step if the last one, which ends at `before` (k,), is too long, else None.
 
         Where cohesive layers soften, a step that is too long increases the energy. The derivative of the energy along the
-        step has the opposite sign of the product of the step with the change to the solution, `image` (k,).
+        step has the opposite sign of the product of the step with the change to the solution, `image` (k,). `start` (k,),
+        `slope` and `fraction` describe the last step, see `_line`.
         """
         end_slope = float(step @ (image - before))
         # A minimum along the step lies between its start and its end. The secant of the slopes is limited to between a tenth
@@ -327,8 +328,8 @@ def newton_step(
     settled : SettledContact
         The last pairing and its solution, where representatives replace the constraints of shared nodes.
     before, image : ndarray (k,)
-        Active displacements of the pairing and of the solution [length]. The next displacements that contact solutions do not
-        determine are those of `image`.
+        Active displacements of the pairing and of the solution [length]. Components without contact or springs are taken from
+        `image`.
     accuracy : float
         Sufficient relative accuracy of the change [-].
     """

@@ -65,7 +65,7 @@ class ThermalLoads:
 
 
 def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoads:
-    """Return the heat loads and films of a model, whose areas and volumes are deformed by a displacement (n_points, dim)."""
+    """Return the heat loads and films of a model, on areas and volumes deformed by a displacement (n_points, dim)."""
     mesh, films = model.mesh, [load for load in model.heat_loads if isinstance(load, Film)]
     deformed = mesh if displacement is None else mesh.replace(points=mesh.points + displacement)
     geometry = mesh, model.kinematics, deformed
@@ -121,7 +121,7 @@ class Heat:
         return self.model.strain == "finite"
 
     def conduction_at(self, displacement: Array) -> Conduction:
-        """Return the conduction, with finite strains that in the configuration deformed by `displacement` (n_points, dim)."""
+        """Return the conduction; with finite strains, in the configuration deformed by `displacement` (n_points, dim)."""
         return replace(self.conduction, displacement=displacement) if self.finite_strain else self.conduction
 
     def temperatures(
@@ -149,14 +149,14 @@ class Heat:
             If open contacts isolate a body, so that its temperature is undetermined, or heat is not in balance.
         """
         n = (self.model.mesh.n_points,)
-        conductivity, exchange = self.matrix, self.loads
+        conductivity, thermal = self.matrix, self.loads
         if displacement is not None and self.finite_strain:
-            conductivity, exchange = self.conduction_at(displacement).matrix(), thermal_loads(self.model, displacement)
-        histories = self.prescribed, exchange.powers, exchange.ambient
-        rise, loads, ambient = (combined(by_ramp, self.ramp, instant, n) for by_ramp in histories)
+            conductivity, thermal = self.conduction_at(displacement).matrix(), thermal_loads(self.model, displacement)
+        by_ramps = self.prescribed, thermal.powers, thermal.ambient
+        rise, loads, ambient = (combined(by_ramp, self.ramp, instant, n) for by_ramp in by_ramps)
         friction_power = np.zeros(n) if friction is None else friction
         conductivity = conductivity if contact is None else csr_array(conductivity + contact)
-        films = exchange.films
+        films = thermal.films
         if obstacles is not None:
             films, ambient = csr_array(films + obstacles[0]), ambient + obstacles[1]
         self._check_determined(contact, films)

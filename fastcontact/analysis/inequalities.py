@@ -227,20 +227,20 @@ def _solution(
     `guess` (n_dofs,) are initial displacements [length]. For the other parameters see `solve_inequalities`.
     """
     problem, path, dofs = step.problem, step.path, step.problem.dofs
-    condensed = dofs.constraints(constraints, lift, step.state.u)
+    reduced = dofs.constraints(constraints, lift, step.state.u)
     u = problem.system.unknowns(guess, lift)[dofs.unknowns]
-    if not condensed.tangents:
-        return active_set.solve(step.loaded, condensed, active, accuracy, u)
+    if not reduced.tangents:
+        return active_set.solve(step.loaded, reduced, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
 
-    condensed = replace(condensed, driven=step.imposed_slips(constraints))
-    if isinstance(path, LastIncrement) and len(path.slip) == len(condensed):
-        condensed = path.since_its_beginning(condensed)
-        solution = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional)
+    reduced = replace(reduced, driven=step.imposed_slips(constraints))
+    if isinstance(path, LastIncrement) and len(path.slip) == len(reduced):
+        reduced = path.since_its_beginning(reduced)
+        solution = friction.solve(step.loaded, reduced, active, accuracy, u, iterate.frictional)
         iterate.frictional = path.over_whole_step(solution)
     else:
         path = path if isinstance(path, LoadPath) else None
-        iterate.frictional = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional, path)
+        iterate.frictional = friction.solve(step.loaded, reduced, active, accuracy, u, iterate.frictional, path)
     return iterate.frictional
 
 
@@ -325,7 +325,7 @@ class _FloatingContact:
         """Return the solution with soft springs that are anchored at a rigid position (k,) [length].
 
         With stiff springs, a problem with friction may have several solutions, none of them near the position of equilibrium.
-        If the iteration does not converge, its forces are no initial guess, except in increments.
+        If the iteration does not converge, its forces are discarded as an initial guess, except in increments.
         """
         step, iterate, last_frictional = self.step, self.iterate, self.iterate.frictional
         slides = in_increments or not iterate.history

@@ -57,7 +57,7 @@ def interpenetration(problem: Problem, last: StepResult, peaks: Sequence[Peak]) 
 
 
 def _pairs_between(problem: Problem) -> PairsBetween:
-    """Return the names of the contact pairs between any two bodies; empty for the two sides of a pretension section."""
+    """Return the names of the contact pairs between any two bodies, none for the two sides of a pretension section."""
     body = bodies(problem.model.mesh)[1]
     groups: dict[frozenset[int], list[str]] = {}
     for name, pair in problem.pairs.items():

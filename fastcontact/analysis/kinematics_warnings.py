@@ -1,8 +1,9 @@
 """Warnings about strains and rotations that linear kinematics do not describe.
 
-In a rotation by a small angle, linear kinematics neglect the strain ``0.5 W.T @ W``, where W is the antisymmetric part of
-the displacement gradient. The work of the stresses on this strain, relative to that on the linear strain, shows whether it
-matters. It vanishes for a beam in bending, whose stresses cancel over the thickness, but not for a belt in tension.
+In a rotation by a small angle, linear kinematics neglect the strain ``0.5 Q.T @ Q``, where Q is the antisymmetric part of
+the displacement gradient. The work of the stresses on this strain, relative to that on the linear strain, shows whether the
+strain matters. The work vanishes for a beam in bending, whose stresses cancel over the thickness, but not for a belt in
+tension.
 
 The second variation of this work is ``u.K_sigma u = 2 N`` with the geometric stiffness K_sigma, where N is the work on the
 neglected strain, whereas ``u.K u = W`` is the work of the stresses on the linear strain. Under given forces, displacements
@@ -166,7 +167,7 @@ def _neglected_rotation(
 def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
     """Return the largest work (n_bodies,) of contact forces with friction in the rigid-body motion of each body [energy].
 
-    It is zero for bodies that deform more than they rotate.
+    It is zero for bodies whose deformation exceeds half of their rotation.
     """
     mesh, dim = problem.model.mesh, problem.model.mesh.dim
     n_bodies, body = bodies(mesh)
@@ -192,13 +193,13 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
 
 
 def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
-    """Return the work of stresses on neglected strains, and the integral of its absolute value on linear strains.
+    """Return the work of stresses on neglected strains, and the integral of their absolute work density on linear strains.
 
     Both are arrays (n_bodies,) [energy].
     """
     mesh, axisymmetric = problem.model.mesh, problem.model.kinematics == "axisymmetric"
-    count, body = bodies(mesh)
-    neglected, work_by_body = np.zeros((2, count))
+    n_bodies, body = bodies(mesh)
+    neglected, work_by_body = np.zeros((2, n_bodies))
     for name, rows in cell_portions(mesh):
         (N, dN, weights), cells = elements.get(name).tables, mesh.cells[name][rows]
         slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
@@ -209,7 +210,7 @@ def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
             radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
             volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_u / radius
         rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
-        # The neglected strain is 0.5 W.T @ W = -0.5 W @ W, since the rotation W is antisymmetric.
+        # The neglected strain is 0.5 Q.T @ Q = -0.5 Q @ Q, since the rotation Q is antisymmetric.
         neglected_work = -0.5 * np.einsum("cqij,cqij->cq", stress_tensor, rotation @ rotation)
         strain, rotated = (np.einsum("cqij,cqij->cq", part, part) for part in (slope - rotation, rotation))
         neglected_work[strain < SINGLE_PRECISION**2 * rotated] = 0.0  # stresses of a rigid-body motion are round-off

@@ -126,12 +126,12 @@ def _end_of_step(
         if settled is not None:
             gap, force = settled.solution.gap, settled.solution.multiplier
             contact_data = {name: (gap[rows], force[rows]) for name, rows in settled.constraints.rows.items()}
-        extrapolation = start.extrapolation.converged(u, contact_data, problem.bodies is not None)
+        extrapolation = start.extrapolation.after(u, contact_data, problem.bodies is not None)
         end = replace(end, extrapolation=extrapolation)
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and settled is not None and (rigid := settled.iterate.rigid) is not None:
-        # May be round-off relative to contact forces. Without loads it is zero, and contact forces are round-off.
+        # This scale may be round-off relative to the contact forces. Without loads it is zero, and they are round-off.
         scale = end.largest_rigid_force
         report = problem.floating_bodies.report(rigid, scale and max(scale, end.largest_force))
         forces = settled.constraints, settled.solution.multiplier
@@ -174,8 +174,8 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         quantities = [load.lift, load_as_force.force, *(() if problem.bodies is None else load.obstacles.values())]
         extrapolation = state.extrapolation
         if not (extrapolation.loads or state.u.any()):
-            extrapolation = extrapolation.to(*map(np.zeros_like, quantities)).converged(state.u, {})
-        start = replace(start, extrapolation=extrapolation.to(*quantities))
+            extrapolation = extrapolation.to_loads(*map(np.zeros_like, quantities)).after(state.u, {})
+        start = replace(start, extrapolation=extrapolation.to_loads(*quantities))
     return StepContext(problem, start, load, loaded, expected, index)
 
 
@@ -281,10 +281,10 @@ def recover(
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
     iterations = dict(iterations)
-    histories: dict[str, Any] = {"temperature": problem.model.temperatures, "initial": problem.model.initial_states}
+    loads_by_kind: dict[str, Any] = {"temperature": problem.model.temperatures, "initial": problem.model.initial_states}
     for name, kind in (("pressure", Pressure), ("spin", Centrifugal)):
-        histories[name] = [load for load in problem.model.loads if isinstance(load, kind)]
-    factors = {name: problem.factors(parts, end.instant) for name, parts in histories.items()}
+        loads_by_kind[name] = [load for load in problem.model.loads if isinstance(load, kind)]
+    factors = {name: problem.factors(parts, end.instant) for name, parts in loads_by_kind.items()}
     iterations |= {f"{name}_factors": values for name, values in factors.items() if values}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     if points := problem.reference_points:

@@ -15,9 +15,9 @@ and D over the elastic energy u.K u / 2 is the additional compliance of the refe
 excess of stiffness where forces act, and is smaller where displacements are prescribed. A few conjugate gradient iterations,
 preconditioned by K^-1, approach the maximum from below. The contact forces are fixed.
 
-The reference uses the projected dilatation of `elasticity.dilatation`; in linear triangles, tetrahedra, wedges and pyramids,
-which lock with it or have none, it uses the mean dilatation of the cells at each node (Bonet and Burton, Commun. Numer. Meth.
-Engng 14, 1998).
+The reference uses the projected dilatation of `elasticity.dilatation`. Linear triangles, tetrahedra, wedges and pyramids lock
+with a projected dilatation or have none; for these, the reference uses the mean dilatation of the cells at each node (Bonet
+and Burton, Commun. Numer. Meth. Engng 14, 1998).
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ SIMPLICES = ("tri3", "tet4")
 
 
 def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Sequence[str]) -> tuple[float, float]:
-    """Return the differences of the stress and of the mean stress in elements called `names` from recovered ones [-].
+    """Return by how much stresses, and mean stresses, in the elements `names` differ from recovered ones [-].
 
     The first is the energy norm of the difference between recovered and computed stress, over that of the computed one. It is
     the largest of the ratios of all bodies together and of single bodies with a notable part of the energy. Where bodies
@@ -100,7 +100,7 @@ def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Seq
 
 
 def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name: str, recovered: Array) -> Array:
-    """Return integrals (n_bodies, 4) of energies and of squared mean stresses, of the difference and of the stress."""
+    """Return integrals (n_bodies, 4): energies of the difference and of the stress, then the squares of their means."""
     mesh, field, element = problem.model.mesh, problem.field, elements.get(name)
     xi, weights = integration_rule(element, 2)
     N, dN = np.ascontiguousarray(element.shape(xi)), element.gradient(xi)
@@ -125,7 +125,7 @@ def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name:
 def _poisson_ratios(model: Model, field: MaterialField) -> tuple[Array, Mask]:
     """Return the largest Poisson's ratios (n,) of a material field, and where they are suspicious.
 
-    They are -1 for materials without a mean dilatation.
+    They are -1 for materials other than `LinearElastic`.
     """
     laws = [material for material, _ in model.materials]
     nu = np.array([law.largest_nu if isinstance(law, LinearElastic) else -1.0 for law in laws])[field.owner]

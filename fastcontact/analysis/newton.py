@@ -110,8 +110,8 @@ class Regularisation:
     replaces_springs: bool = False
 
     @property
-    def linear(self) -> bool:
-        """Whether iterations with this tangent converge only linearly."""
+    def converges_linearly(self) -> bool:
+        """Whether iterations with this tangent converge only linearly, not quadratically."""
         return self.geometric < COMPLETE or self.gap_stiffness > 0.0
 
 
@@ -163,7 +163,7 @@ class _Newton:
             small = self._has_converged(changes) or change <= self._start.gap_round_off
             if fraction == 1.0 and force_balance.residual <= force_balance.bound and small:
                 return StepEquilibrium(self._settled, u, force_balance, self._terms, history)
-            self._has_full_step = fraction == 1.0 and not self._regularisation.linear
+            self._has_full_step = fraction == 1.0 and not self._regularisation.converges_linearly
             u = self._accelerated(before, u, changes) if fraction == 1.0 else u
             if len(changes) > WINDOW and min(changes[-WINDOW:]) > DECLINE * min(changes[:-WINDOW]):
                 break
@@ -179,7 +179,7 @@ class _Newton:
         return change / size if size else 0.0
 
     def _has_converged(self, changes: list[float]) -> bool:
-        """Return whether relative `changes` after an accurate linear solution leave an error below the criterion.
+        """Return whether the relative `changes` show an error below the criterion; never after an inexact solution.
 
         A change that is small enough to be round-off (SINGLE_PRECISION, reached in slender bodies) is regarded as round-off
         if it exceeds the fraction DECLINE of the previous one.
@@ -187,7 +187,7 @@ class _Newton:
         if self._linear_tolerance is not None:
             return False
         rate, last = self._rate(changes), changes[-1]
-        if self._regularisation.linear:
+        if self._regularisation.converges_linearly:
             return last * rate <= self._tolerance * (1.0 - rate) or (last <= SINGLE_PRECISION and rate == 1.0)
         return last * rate <= self._tolerance or (last <= SINGLE_PRECISION and rate > DECLINE)
 
@@ -206,14 +206,14 @@ class _Newton:
     def _accelerated(self, before: Array, u: Array, changes: list[float]) -> Array:
         """Return the next iterate (n_dofs,) [length], after an iteration from `before` (n_dofs,) to u (n_dofs,).
 
-        Anderson acceleration is used where a regularised tangent makes the iterations converge linearly. So do the springs
-        of floating bodies if the load turns a body, like a roller without friction: its rotations change by a constant
-        factor, which exceeds 1 if its equilibrium is unstable.
+        Anderson acceleration is used where a regularised tangent makes the iterations converge linearly. The springs of
+        floating bodies have the same effect if the load turns a body, such as a roller without friction: changes of its
+        rotation then have a constant ratio, which exceeds 1 if the equilibrium is unstable.
         """
-        linear = self._regularisation.linear
+        is_linear = self._regularisation.converges_linearly
         if self._problem.floating_bodies is not None and len(changes) > 2 and changes[-1] <= NOTABLE:
-            linear |= changes[-1] > DECLINE * changes[-2] > DECLINE**2 * changes[-3]
-        if not linear or DECLINE * changes[-1] > changes[-2]:
+            is_linear |= changes[-1] > DECLINE * changes[-2] > DECLINE**2 * changes[-3]
+        if not is_linear or DECLINE * changes[-1] > changes[-2]:
             self._mixing.restart()
             return u
         return self._mixing.mixed(before, u)
@@ -238,12 +238,12 @@ class _Newton:
         return balance(self._problem, u, contact_force, self._load.force, self._start.largest_force, internal)
 
     def _solve(self, u: Array, changes: list[float]) -> tuple[Array, Array]:
-        """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of terms linearised at u (n_dofs,).
+        """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the step linearised at u (n_dofs,).
 
         The contact geometry is iterated to a fraction of the last relative change of the displacements in `changes`. If the
         tangent is not positive definite, the springs of floating bodies are stiffened. If this does not suffice, springs are
         added along closed gaps, with which convergence remains quadratic except for motions that contact does not restrain.
-        Finally, parts of the geometric stiffness are omitted. Once springs have sufficed, they are tried first.
+        Finally, parts of the geometric stiffness are omitted. Once springs along gaps have sufficed, they are tried first.
         """
         # The changes increase if a floating body moves in directions that springs along gaps do not resist.
         if self._regularisation.gap_stiffness and changes[-1] > changes[-2] > min(changes):
@@ -281,7 +281,7 @@ class _Newton:
         return [*tangents, *(Regularisation(part, stiff=stiff) for part in fewer_parts)]
 
     def _solve_linearised(self, u: Array, changes: list[float], regularisation: Regularisation) -> tuple[Array, Array]:
-        """Return the result of `_solve` for a tangent."""
+        """Return the result of `_solve` for one regularisation."""
         terms, iterate = self._terms, self._iterate
         problem = self._reusable if self._tangent_suffices(changes) else None
         self._reusable = None
@@ -323,8 +323,9 @@ class _Newton:
     def _forcing(self, problem: Problem, load: StepLoad, u: Array, unbalanced: Array) -> float | None:
         """Return the tolerance of the linear solution from u (n_dofs,), None for that of the solver (inexact Newton method).
 
-        `unbalanced` (n_dofs,) are the residual forces of the terms at u. Their ratio to the largest force is about squared in
-        each iteration. If the next ratio will be small enough for the last iteration, the tolerance is that of the solver.
+        `unbalanced` (n_dofs,) are the residual forces of the terms at u. The ratio of the largest of them to the largest
+        force is about squared in each iteration. If the next iteration will be the last one, the tolerance is that of the
+        solver.
         """
         system, lift = problem.system, load.lift
         scale = max(largest(system.right_side(load.force, lift)), self._start.largest_force)
@@ -352,8 +353,8 @@ class _Newton:
             sticking_rows = [tangent[np.flatnonzero(closed & solution.sticking)] for tangent in constraints.tangents]
             rows = csr_array(vstack([constraints.B[np.flatnonzero(closed)], *sticking_rows]))
             squares = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
-            nodal = K.data[K.indices == np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))]
-            stiffest = float(np.linalg.eigvalsh(nodal).max())  # the largest entry would depend on the axes
+            diagonal_blocks = K.data[K.indices == np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))]
+            stiffest = float(np.linalg.eigvalsh(diagonal_blocks).max())  # the largest entry would depend on the axes
             stiffness = regularisation.gap_stiffness * stiffest / np.where(squares > 0.0, squares, np.inf)
             matrices.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
         for matrix in matrices:

@@ -349,12 +349,12 @@ def prepare(
     points = np.unique(np.concatenate([driven_points, *side_points])).astype(np.intp)
     contact_dofs = (points[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
     motions = _floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, solver.iterative, model.springs) if len(motions) else None
-    dofs = _prepared_dofs(model, solver, system, bodies, contact_dofs)
+    floating = FloatingBodies(motions, system, solver.iterative, model.springs) if len(motions) else None
+    dofs = _prepared_dofs(model, solver, system, floating, contact_dofs)
     thermal = {} if model.nonlinear else model.thermal_forces_by_ramp()
     forces = sums_by_ramp([*model.forces_by_ramp().items(), *thermal.items(), *model.initial_forces_by_ramp().items()])
     return Problem(
-        model, ramp, criteria, solver, pairs, field, sides, system, bodies, dofs, contact_dofs, driven,
+        model, ramp, criteria, solver, pairs, field, sides, system, floating, dofs, contact_dofs, driven,
         driven.prescribed(prescribed), driven.forces(forces), solver.snapshot(), tuple(warnings),
         model.nonlinear_bodies(field), model.following_pressures() if model.strain == "finite" else [],
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
@@ -362,7 +362,7 @@ def prepare(
 
 
 def linearised(
-    problem: Problem, K: bsr_array, u: Array, contact: csr_array | None, stiff_springs: bool, replaces_springs: bool
+    problem: Problem, K: bsr_array, u: Array, K_contact: csr_array | None, stiff_springs: bool, replaces_springs: bool
 ) -> Problem:
     """Return a problem whose system and linear solver use the tangent of the terms at displacements u.
 
@@ -375,16 +375,16 @@ def linearised(
         Tangent of the terms, see `Terms.tangent`; it is modified [force / length].
     u : ndarray (n_dofs,)
         Displacements about which the terms are linearised [length].
-    contact : csr_array (n_dofs, n_dofs), optional
+    K_contact : csr_array (n_dofs, n_dofs), optional
         Stiffness due to contact, which is added to K [force / length].
     stiff_springs : bool
         Whether the springs of floating bodies are as stiff as the bodies.
     replaces_springs : bool
-        Whether the springs of floating bodies are omitted if `contact` resists all their motions. The iteration of positions
-        may not converge for a tangent that is nearly singular.
+        Whether the springs of floating bodies are omitted if `K_contact` resists all their motions. For a nearly
+        singular tangent, the iteration of positions with springs may not converge.
     """
     K, model, floating = problem.force_driven.stiffness(K), problem.model, problem.floating_bodies
-    system = problem.system.with_stiffness(K if contact is None else sum_of_blocks(K, contact))
+    system = problem.system.with_stiffness(K if K_contact is None else sum_of_blocks(K, K_contact))
     solver, displacement = problem.solver.copy_for_similar_matrix(), problem.displacement(u)
     finite = problem.bodies and problem.bodies.finite
     if floating is not None and finite:
@@ -393,9 +393,9 @@ def linearised(
             rotated = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
             motions = rotated if len(rotated) == len(motions) else motions
         floating = FloatingBodies(motions, system, problem.solver.iterative and not stiff_springs, model.springs)
-    if replaces_springs and floating is not None and contact is not None:
+    if replaces_springs and floating is not None and K_contact is not None:
         modes = floating.motions.displacement
-        values = np.linalg.eigvalsh(modes.T @ (contact @ modes))
+        values = np.linalg.eigvalsh(modes.T @ (K_contact @ modes))
         floating = None if values[0] > SINGLE_PRECISION * values[-1] else floating
     dofs = _prepared_dofs(model, solver, system, floating, problem.contact_dofs, displacement)
     point = u if finite else None
@@ -414,7 +414,7 @@ def _floating_motions(model: Model, supported: Mask, displacement: Array | float
 
 
 def _prepared_dofs(
-    model: Model, solver: LinearSolver, system: System, bodies: FloatingBodies | None, contact_dofs: Indices,
+    model: Model, solver: LinearSolver, system: System, floating: FloatingBodies | None, contact_dofs: Indices,
     displacement: Array | float = 0.0,
 ) -> ActiveDofs:  # fmt: skip
     """Prepare the linear solver for a system, and return the degrees of freedom of the contact problem.
@@ -427,7 +427,7 @@ def _prepared_dofs(
     model : Model
     solver : LinearSolver
     system : System
-    bodies : FloatingBodies or None
+    floating : FloatingBodies or None
         Floating bodies, whose springs are added to the matrix.
     contact_dofs : ndarray of int
         Degrees of freedom of the contact surfaces.
@@ -435,13 +435,13 @@ def _prepared_dofs(
         Displacements at which the near null space is computed [length].
     """
     involved, matrix = system.involved_unknowns(contact_dofs), system.matrix
-    if bodies is not None:
-        involved, matrix = np.union1d(involved, bodies.dofs), bodies.with_springs(matrix)
+    if floating is not None:
+        involved, matrix = np.union1d(involved, floating.dofs), floating.with_springs(matrix)
     modes = system.unknowns_of(model.force_driven.near_nullspace(near_nullspace(model, displacement)))
     retained = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
         system.set_matrix(retained)
-    springs = np.empty(0, np.intp) if bodies is None else bodies.dofs
+    springs = np.empty(0, np.intp) if floating is None else floating.dofs
     return ActiveDofs(system, contact_dofs, springs, involved if model.contact and solver.condenses else None)
 
 

@@ -159,8 +159,9 @@ def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: A
 def _past_edge(pair: Formulation, configuration: Configuration, contact: ContactResult, strain: str) -> Iterator[str]:
     """Yield a warning where a surface has deformed past the edge of a rigid obstacle, beyond which it carries no force.
 
-    With small strains, areas do not change, and the contact area therefore decreases. With finite strains it only decreases
-    because a facet is cut. Under a punch on a plastic half-space, the force is 17 % too small where the estimate is 16 %.
+    With small strains, areas do not change, so that the area opposite the obstacle decreases as points move past its edge.
+    With finite strains it only decreases because facets are cut by the edge. Under a punch on a plastic half-space, the force
+    is 17 % too small where the estimate is 16 %.
     """
     side, primary, pose = pair.secondary, pair.primary, configuration.pose
     positions = pair.points, pair.points + configuration.displacement
@@ -201,9 +202,9 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
 
 
 def _excessive_wear(name: str, pair: Formulation, state: State, is_smooth: bool) -> Iterator[str]:
-    """Yield warnings about a coefficient of wear in another unit, and about a contact that moves too far in a load step.
+    """Yield warnings about a coefficient of wear in a wrong unit, and about a contact that moves too far in a load step.
 
-    Unless pressures are smooth, nodes also open and close in a contact that does not move.
+    The latter is only given where pressures are smooth, since otherwise nodes also open and close in a contact at rest.
     """
     if name not in state.worn:
         return
@@ -268,9 +269,10 @@ def _unconverged_geometry(state: State) -> Iterator[str]:
 def _turning_flow(state: State) -> Iterator[str]:
     """Yield a warning where the plastic flow changes its direction notably within load steps.
 
-    The change in a single step depends on whether the edge of the contact crosses a node. Its mean decreases: under a
-    ball that is pressed in with 4, 8, 16 and 32 steps, the mean changes of stress are 2.3, 1.9, 1.6 and 0.9 %, and the
-    depth is 7, 4, 2 and 1 % too large. In the first step, the path is unknown, and changes would be underestimated.
+    The change in a single step depends on whether the edge of the contact crosses a node. The mean over the steps decreases
+    with their number: under a ball that is pressed in with 4, 8, 16 and 32 steps, the mean changes of stress are 2.3, 1.9,
+    1.6 and 0.9 %, and the depth is 7, 4, 2 and 1 % too large. In the first step, the path is unknown, and changes would be
+    underestimated.
     """
     size, change = state.flow
     if change > NOTABLE * size:
@@ -388,7 +390,7 @@ def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> 
         if contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
             yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
         return
-    closed = _or_between_closed(contact.active, pair.secondary)
+    closed = _closed_or_enclosed(contact.active, pair.secondary)
     count = facets_across_radius(pair.secondary, closed, pair.excluded[pair.secondary.points])
     if count is not None and count < MIN_FACETS_ACROSS_RADIUS:
         resolution = f"{count} {'elements' if count > 1 else 'element'} across its radius"
@@ -456,7 +458,7 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
     if pair.options.kind in ALWAYS_CLOSED or pair.options.cohesion is not None:
         return
     side = pair.secondary
-    inside, ratio, difference = _alternation(side, contact.pressure[:, None], _or_between_closed(contact.active, side))
+    inside, ratio, difference = _alternation(side, contact.pressure[:, None], _closed_or_enclosed(contact.active, side))
     limit = ALTERNATING_ON_LINES if side.order == 2 and pair.points.shape[1] == 2 else ALTERNATING
     if ratio > limit and contact.pressure[inside].mean() > 0.0:
         yield (
@@ -471,9 +473,9 @@ def _quadrature_error(
 ) -> Iterator[str]:
     """Yield a warning about a large pressure error due to integration over complete facets.
 
-    Of `Continuous.quadrature_error`, the stiffer body carries the larger part. On blocks under a uniform pressure, the errors
-    of nodal pressures were 0.8 to 1.4 times the estimate, and in press fits 0.5 to 2.5 times. Pairs with a penalty or with
-    excluded nodes are ignored, because other errors would count.
+    The estimate is `Continuous.quadrature_error` times the ratio of the secondary modulus to the sum of both moduli. On
+    blocks under a uniform pressure, the errors of nodal pressures were 0.8 to 1.4 times the estimate, and in press fits 0.5
+    to 2.5 times. Pairs with a penalty or with excluded nodes are ignored, because the estimate would include other errors.
     """
     if pair.name != "continuous" or isinstance(pair.primary, RigidSide) or pair.options.kind in ALWAYS_CLOSED:
         return
@@ -621,8 +623,8 @@ def _alternation(side: Surface, values: Array, selected: Mask) -> tuple[Mask, fl
     return inside, float(np.median(relative)) if inside.sum() >= MIN_NODES else 0.0, difference
 
 
-def _or_between_closed(closed: Mask, side: Surface) -> Mask:
-    """Return the `closed` nodes (n_nodes,) and those between closed nodes only, in the sense of `_alternation_matrix`."""
+def _closed_or_enclosed(closed: Mask, side: Surface) -> Mask:
+    """Return the `closed` nodes (n_nodes,) and those whose neighbours in `_alternation_matrix` are all closed."""
     others = _alternation_matrix(side)
     return closed | ((others @ ~closed == 0) & (np.diff(others.indptr) > 0))
 

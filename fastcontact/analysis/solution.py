@@ -74,10 +74,10 @@ def response(loaded: Loaded, R: csr_array, positions: Indices, forces_of: Callab
     R : csr_array (q, n)
         Derivatives of gaps and of slips [-].
     positions : ndarray of int (q,)
-        Their positions in arrays (1 + k, m) of the gaps and slips of all constraints.
+        Positions of these gaps and slips in arrays (1 + k, m) for all constraints.
     forces_of : callable
-        Function that returns the change (q,) of their normal and tangential forces [force], given a change (q,) of the gaps
-        and slips [length].
+        Function that returns the change (q,) of the corresponding normal and tangential forces [force], given a change (q,)
+        of the gaps and slips [length].
     """
     without_force, transpose = loaded.full_solution(np.zeros(R.shape[1])), csr_array(R.T)
 
@@ -271,10 +271,10 @@ class Solution:
     last_increment: LastIncrement | None = None
 
     @classmethod
-    def frictionless(cls, u: Array, multiplier: Array, gap: Array, active: Mask, wanted: Mask) -> Solution:
+    def frictionless(cls, u: Array, multiplier: Array, gap: Array, active: Mask, next_active: Mask) -> Solution:
         """Return the solution for one active set without friction."""
-        settled, no_tangents = bool(np.array_equal(active, wanted)), np.zeros((len(gap), 0))
-        return cls(u, multiplier, gap, active, wanted, settled, 1, no_tangents, no_tangents, active)
+        settled, no_tangents = bool(np.array_equal(active, next_active)), np.zeros((len(gap), 0))
+        return cls(u, multiplier, gap, active, next_active, settled, 1, no_tangents, no_tangents, active)
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return the normal and tangential forces (1 + k, m) in components along other tangents (m, dim) [force].
@@ -289,14 +289,14 @@ class Solution:
 
 
 def in_increments(
-    lag: Array, closing: Array, y: Array, waiting: Mask, solve: IncrementSolver
+    initial_offset: Array, closing: Array, y: Array, waiting: Mask, solve: IncrementSolver
 ) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array, float]]:
     """Return the forces at the end of a load step that is solved in increments, which end where constraints close.
 
     Parameters
     ----------
-    lag : ndarray (1 + k, m)
-        Gaps and slips at the beginning of the step, minus those at its end if contact forces did not change [length].
+    initial_offset : ndarray (1 + k, m)
+        Gaps and slips at the beginning of the step, minus those at its end under unchanged contact forces [length].
     closing : ndarray (1 + k, m)
         Gaps at the beginning of the step, and the slips that closing them would add, see `LoadPath.along` [length].
     y : ndarray (1 + k, m)
@@ -315,22 +315,22 @@ def in_increments(
         Data of `LastIncrement`: the components (3, k, m) of its three vectors along the tangents, and its attributes
         `integrals`, `normal` and `begin`.
     """
-    closed, slip, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), 0, True
-    integrals = np.zeros((2, lag.shape[1]))
+    closed, slip, iterations, settled = y[0] > 0.0, np.zeros_like(initial_offset[1:]), 0, True
+    integrals = np.zeros((2, initial_offset.shape[1]))
     gap = last_gap = closing[0]
     slip_before_closing = np.zeros_like(slip)
-    added = np.where(gap > 0.0, closing[1:], 0.0)
-    lag = lag + np.vstack([np.zeros_like(gap), added])
+    closing_slips = np.where(gap > 0.0, closing[1:], 0.0)
+    initial_offset = initial_offset + np.vstack([np.zeros_like(gap), closing_slips])
 
     def increment(end: float) -> FrictionSolution:
-        remaining = (1.0 - end) * lag
+        remaining = (1.0 - end) * initial_offset
         remaining[1:] -= slip
         return solve(remaining, ~waiting, closed, y if y.any() else None)
 
     def slip_after(increase: Array, gaps: Array) -> Array:
         """Return the slips (k, m) after an `increase` (k, m), without the closing motion of the remaining `gaps` (m,)."""
         open_fraction = np.divide(np.maximum(gaps, 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
-        return np.asarray(slip + increase - open_fraction * added)
+        return np.asarray(slip + increase - open_fraction * closing_slips)
 
     begin = 0.0
     while begin < 1.0:
@@ -365,7 +365,7 @@ def _next_to_close(begin: Array, end: Array, waiting: Mask, count: int) -> tuple
     [length]. Fractions of constraints that do not close are infinite.
     """
     closing = waiting & (end < 0.0)
-    # Constraints that penetrate more now than at the end close at once.
+    # Constraints whose penetration decreases in the remaining step close at once.
     instants = np.where(closing, 0.0, np.inf)
     fraction = np.divide(np.maximum(begin, 0.0), begin - end, out=instants, where=closing & (begin > end))
     last = np.sort(fraction[closing])[:count][-1]

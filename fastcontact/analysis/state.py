@@ -78,7 +78,7 @@ class State:
         The largest nodal force of all steps so far, and the largest generalised force of the loads on a rigid-body motion
         that is free [force].
     touched : frozenset of str
-        Contact pairs that were closed at the end of a step.
+        Contact pairs that were closed at the end of at least one step.
     work : Work, optional
         Work of all steps so far; None after a restart from data of an earlier version, which did not compute it.
     forces : dict of str to ContactForces
@@ -89,8 +89,8 @@ class State:
     history : dict of str to ndarray (n_cells, n_q, 9)
         History variables of nonlinear bodies, by element type, see `constitutive_kernels`; empty before the first step.
     flow : (float, float)
-        Norm of the stresses of all points that yield in a step, and its change if the step were halved, summed over all steps
-        but the first [pressure].
+        Norms of the stresses of all points that yield in a step, and of the change of these stresses if the step were halved,
+        each summed over all steps but the first [pressure].
     rise : ndarray (n_points,), optional
         Temperature rise above the reference temperature, in models with conduction of heat [temperature].
     instant : float
@@ -164,7 +164,7 @@ class State:
         displacement : ndarray (n_points, dim)
             Displacement at the end of the last step [length].
         touched : frozenset of str
-            Contact pairs that were closed at the end of a step, in addition to those in `data`.
+            Contact pairs that were closed at the end of at least one step, in addition to those in `data`.
         """
         u = np.concatenate([displacement.ravel(), data["obstacles"]])
         pairs, numbers, extrapolation = data["pairs"], data["numbers"], data.get("extrapolation")

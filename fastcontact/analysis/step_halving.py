@@ -128,14 +128,14 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
     by less than the smallest facet, with heat conduction, and with a fixed number of geometry updates.
     """
     pairs = {name: pair for name, pair in problem.pairs.items() if pair.friction and pair.options.kind != "tied"}
-    closed = [any(ends.active[name].any() for name in pairs if name in ends.active) for ends in (state, after)]
+    closed = [any(s.active[name].any() for name in pairs if name in s.active) for s in (state, after)]
     if not pairs or closed != [False, True] or problem.heat is not None or not problem.until_settled:
         return False
     zero = np.zeros(problem.model.mesh.dim)
-    poses = [np.stack([ends.obstacles.get(name, zero) for name in pairs]) for ends in (state, after)]
+    positions = [np.stack([s.obstacles.get(name, zero) for name in pairs]) for s in (state, after)]
     turns = {name: abs(angle - state.angles.get(name, 0.0)) for name, angle in after.angles.items() if name in pairs}
     arcs = [turn * float(np.linalg.norm(np.ptp(pairs[name].points, axis=0))) for name, turn in turns.items()]
-    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *arcs)
+    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(positions[1] - positions[0]), *arcs)
     if motion < min(float(pair.secondary.largest_diameters(pair.points).min()) for pair in pairs.values()):
         return False
     load = problem.load_at(after.instant)

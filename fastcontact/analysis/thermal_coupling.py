@@ -1,7 +1,7 @@
 """Staggered solution of heat conduction and contact, which are coupled by thermal expansion and contact conductance.
 
 Each exchange computes the equilibrium at given temperatures, and then the temperatures with the conductances of this
-equilibrium. Anderson acceleration is applied to the temperatures. If they depend neither on the contact nor on finite
+equilibrium. Anderson acceleration is applied to the temperatures. If temperatures depend neither on the contact nor on finite
 deformations, they are computed only once, before the contact.
 """
 
@@ -130,7 +130,7 @@ def _steady_temperatures(
     """Return the temperatures for the contact conductances and the frictional heat of an equilibrium."""
     settled, u, displacement = equilibrium.settled, equilibrium.u, problem.displacement(equilibrium.u)
     n, laws, conducting = problem.model.mesh.n_points, problem.model.conductances(), {}
-    matrix, obstacles = csr_array((n, n)), csr_array((n, n))
+    contact_matrix, obstacle_matrix = csr_array((n, n)), csr_array((n, n))
     friction_power, obstacle_power = np.zeros((2, n))
     for name, pair in problem.pairs.items():
         law = laws.get(name)
@@ -150,16 +150,16 @@ def _steady_temperatures(
             h[facing] = law(force[facing] / link.area[facing], gap[facing])
             obstacle_rise = 0.0
             if pair.options.obstacle_temperature is None:
-                matrix = csr_array(matrix + link.matrix(h))
+                contact_matrix = csr_array(contact_matrix + link.matrix(h))
             else:
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
-                obstacles = csr_array(obstacles + link.matrix(h))
+                obstacle_matrix = csr_array(obstacle_matrix + link.matrix(h))
                 obstacle_power = obstacle_power + link.secondary.T @ (h * link.area * obstacle_rise)
             conducting[name] = link, constraints.nodal_field, h, obstacle_rise, area_ratio[pair.secondary.points]
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))
-    steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
+    steady = heat.temperatures(instant, displacement, contact_matrix, friction_power, (obstacle_matrix, obstacle_power))
     fluxes, heat_flows = {}, {}
     for name, (link, field, h, obstacle_rise, area_ratio) in conducting.items():
         power = h * link.area * (link.jump @ steady.rise - obstacle_rise)
@@ -172,14 +172,14 @@ def _normal_state(
 ) -> tuple[Constraints, Array, Array]:
     """Return the constraints of a pair, their normal forces (m,) [force], and their gaps (m,), zero if closed [length]."""
     pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
-    touching = LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+    gap_round_off = LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
     forces = np.maximum(constraints.normal_forces(constraints.contact_forces(solution.multiplier[rows])), 0.0)
     if pair.options.kind == "tied":
         return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))
     closed, layer, wetted = solution.active[rows], constraints.tied, constraints.wetted
     if pair.options.kind != "gap_only" and layer is None and wetted is None:
         gap = np.maximum(solution.gap[rows], 0.0)
-        return constraints, forces, np.where(closed | (gap <= touching), 0.0, gap)
+        return constraints, forces, np.where(closed | (gap <= gap_round_off), 0.0, gap)
     constraints = pair.unilateral(configuration)
     gap = np.maximum(constraints.gaps(configuration.displacement), 0.0)
     if wetted is not None:
@@ -188,4 +188,4 @@ def _normal_state(
         closed = layer.damage == 0.0 if layer.law.reversible else layer.damage < 1.0
     elif pair.options.kind == "gap_only":
         closed, forces = np.zeros(len(gap), bool), np.zeros(len(gap))
-    return constraints, forces, np.where(closed | (gap <= touching), 0.0, gap)
+    return constraints, forces, np.where(closed | (gap <= gap_round_off), 0.0, gap)

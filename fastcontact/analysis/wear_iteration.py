@@ -29,7 +29,7 @@ def newton_with_wear(begin: StepContext, load: StepLoad, before: StepEquilibrium
     """Return the equilibrium of a load step, including the wear of this step; for parameters see `newton`.
 
     The iteration also ends if the error of the depths no longer decreases. With friction this may happen where nodes open,
-    because work of friction and wear then change discontinuously. The error takes effect in the next step.
+    because the work of friction and the wear then change discontinuously. The next step begins with the corrected depths.
     """
     problem, start = begin.problem, begin.state
     sides = {name: pair.secondary for name, pair in problem.pairs.items() if pair.options.wear is not None}

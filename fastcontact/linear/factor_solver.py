@@ -33,7 +33,7 @@ STORED_LOADS = 4
 
 
 class KnownLoads:
-    """The last right-hand sides and their solutions, which are combined for linear combinations of these right-hand sides."""
+    """The last right-hand sides and their solutions, from which those of linear combinations are computed."""
 
     def __init__(self, n: int) -> None:
         self._loads = self._solutions = np.empty((0, n))

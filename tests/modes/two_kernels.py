@@ -14,8 +14,8 @@ from fastcontact.linear.krylov import krylov_kernels  # noqa: E402
 
 interpreting.MAX_SECONDS = -1.0  # not Python in the place of a kernel
 a, b = np.arange(40.0), np.arange(40.0)
-krylov_kernels.turn(0, 40, 2.0, a, b)
-stats = [kernel.stats for kernel in (krylov_kernels.turn, factorisation_kernels.work_sizes.compiled)]
+krylov_kernels.direction(0, 40, 2.0, a, b)
+stats = [kernel.stats for kernel in (krylov_kernels.direction, factorisation_kernels.work_sizes.compiled)]
 front = np.array([-1], np.int32), np.array([0, 3]), np.array([0, 0])  # one supernode of three columns
 found = {
     "right": bool((3.0 * a == b).all()) and factorisation_kernels.work_sizes(*front) == (9, 0),

@@ -46,8 +46,8 @@ class Delassus:
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of F."""
-        S = self.S.diagonal() if self.U is None else self.U.multiply(self.U @ self.S).sum(axis=1)
-        return np.asarray(self.d + S)
+        added = self.S.diagonal() if self.U is None else self.U.multiply(self.U @ self.S).sum(axis=1)
+        return np.asarray(self.d + added)
 
     def diagonal_blocks(self, number: Indices) -> Array:
         """Return the compliance (1 + k, 1 + k, m) of each constraint.
@@ -55,27 +55,27 @@ class Delassus:
         `number` (1 + k, m) are the numbers in F of the normal components, then of the components along each tangent.
         Components with negative numbers have no compliance.
         """
-        given = number >= 0
+        compliant = number >= 0
         if self.U is None:
             values = self.S[number[:, None], number]
         else:
             US = self.U @ self.S
             values = np.array([[self.U[j].multiply(US[i]).sum(axis=1) for j in number] for i in number])
         values = values + np.where(number[:, None] == number, self.d[number], 0.0)
-        return np.where(given[:, None] & given, values, 0.0)
+        return np.where(compliant[:, None] & compliant, values, 0.0)
 
     def scaled(self, units: Array) -> Delassus:
-        """Return F, whose rows and columns are multiplied by `units` (n,)."""
+        """Return F with rows and columns multiplied by `units` (n,)."""
         if self.U is None:
             return Delassus(self.d * units**2, units[:, None] * self.S * units)
         return Delassus(self.d * units**2, self.S, scaled(self.U, units))
 
-    def decoupled(self, n: Indices, diagonal: Array) -> Delassus:
-        """Return F with zeros in the rows and columns `n` (q,), except for the values `diagonal` (q,) on the diagonal."""
+    def decoupled(self, selected: Indices, diagonal: Array) -> Delassus:
+        """Return F with zeros in the rows and columns `selected` (q,), except for `diagonal` (q,) on the diagonal."""
         units = np.ones(len(self.d))
-        units[n] = 0.0
+        units[selected] = 0.0
         decoupled = self.scaled(units)
-        decoupled.d[n] = diagonal
+        decoupled.d[selected] = diagonal
         return decoupled
 
     def rotated(self, Q: csr_array | None) -> Delassus:
@@ -86,16 +86,16 @@ class Delassus:
             return Delassus(self.d, np.asarray(Q @ (Q @ self.S).T))
         return replace(self, U=csr_array(Q @ self.U))
 
-    def submatrix(self, n: Indices) -> Delassus:
-        """Return the submatrix of the rows and columns `n`."""
+    def submatrix(self, selected: Indices) -> Delassus:
+        """Return the submatrix of the rows and columns `selected` (q,)."""
         if self.U is None:
-            return Delassus(self.d[n], self.S[np.ix_(n, n)])
-        return Delassus(self.d[n], self.S, self.U[n])
+            return Delassus(self.d[selected], self.S[np.ix_(selected, selected)])
+        return Delassus(self.d[selected], self.S, self.U[selected])
 
     def in_accurate_form(self) -> Delassus:
         """Return F, with U only if the solutions of Newton steps are then accurate up to ROUND_OFF.
 
-        Their relative error is about that of double precision times the square of the ratio of F to d on the diagonal.
+        Their relative error is about the machine epsilon times the square of the largest ratio of the diagonal of F to d.
         """
         if self.U is None:
             return self
@@ -106,7 +106,7 @@ class Delassus:
 
     @property
     def is_singular(self) -> bool:
-        """Whether F is singular up to round-off, given that it is scaled to a diagonal of ones for the gaps.
+        """Whether F is singular up to round-off, if it is scaled such that the compliance of each gap is one.
 
         With U, F can be singular only for forces in the range of the columns of ``diag(d)^-1 U`` with negative values in S.
         """
@@ -125,7 +125,10 @@ class Delassus:
 
 
 def of_rows(loaded: Loaded, R: csr_array, factored: bool) -> tuple[Array, Delassus]:
-    """Return the gaps and slips (n,) without contact forces, and their Delassus operator, `factored` with U = R or not."""
+    """Return the gaps and slips (n,) without contact forces, and their Delassus operator.
+
+    `R` (n, n_unknowns) are their derivatives. If `factored`, U contains the nonempty columns of R, otherwise there is no U.
+    """
     if not factored:
         check_rows(R.shape[0], MAX_ROWS_WITH_FRICTION)
         free, F = loaded.delassus(R)

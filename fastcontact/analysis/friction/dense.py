@@ -6,7 +6,7 @@ where F is the Delassus operator, and ``free`` are the gaps and slips without co
 
 1. Newton's method with and without a line search, see `cone_newton`. In 2D it is an active set method, in which the state
    of a constraint is open, stick, or slip in one of two directions.
-2. Newton's method from the solution with a compliance that decreases to round-off.
+2. Newton's method from the solution with an additional compliance, which is decreased to round-off (continuation).
 3. Newton's method from the solution for a polyhedral friction cone with few edges. With such a cone the problem is a linear
    complementarity problem, which Lemke's method solves for every positive definite F and every coefficient of friction mu
    (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
@@ -58,15 +58,15 @@ def solve(
     mu : ndarray (m,)
         Coefficients of friction [-].
     closed : ndarray of bool (m,)
-        Constraints that are assumed closed and sticking in an initial guess of Newton's method. If there are none, the
-        constraints whose gap without forces is negative are assumed closed and sticking.
+        Constraints that are assumed closed and sticking in an initial guess of Newton's method. If there are none, those
+        whose gap without contact forces is negative are assumed closed and sticking.
     guess : ndarray (1 + k, m), optional
         Another initial guess of the forces, which is tried first [force].
     equality : ndarray of bool (m,), optional
         Constraints that are equations, without friction.
     components : ndarray of int (n,), optional
-        Positions, in arrays (1 + k, m), of the components that belong to F, by default all; they include all normal ones. The
-        forces along the other components are zero.
+        Positions, in arrays (1 + k, m), of the components that belong to F, by default all; all normal components must belong
+        to it. The forces along the other components are zero.
 
     Returns
     -------
@@ -78,26 +78,25 @@ def solve(
     law = Law(np.where(equality, 0.0, mu), equality)
     if not m:
         return FrictionSolution(free * 0.0, free, closed, closed, True, 0.0, 0)
-    unit = units_of_force(F, m)
-    length = largest(free * unit) or 1.0
+    force_units = units_of_force(F, m)
+    scale = largest(free * force_units) or 1.0
     components = np.arange(free.size) if components is None else components
-    units = unit[components % m]
-    F, best, iterations, elastic_slip = F.scaled(units), None, 0, 0.0
+    F, best, iterations, elastic_slip = F.scaled(force_units[components % m]), None, 0, 0.0
     if guess is not None:
-        guess = guess / (length * unit)
+        guess = guess / (scale * force_units)
     for compliance in REGULARISATION if F.is_singular else (0.0,):
         regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F.d)))
         F = replace(F, d=F.d + scattered(np.full(len(regularised), compliance), regularised, F.d.shape))
-        scaled_free = free * unit / length
+        scaled_free = free * force_units / scale
         problem = _Problem(F, scaled_free, law, components, SUM_ROUND_OFF * largest(scaled_free))
         for start, line_search in problem.starts(closed, guess):
-            # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
-            # which is common to all constraints, although gaps of constraints with a large compliance are not closed.
-            forces = newton(problem, start, problem.gaps(start), line_search=line_search, min_iterations=1)
-            iterations += 1 + forces.iterations
-            if best is None or forces.residual < best.residual:
-                best, elastic_slip = forces, compliance * largest(forces.y.ravel()[components[regularised]])
-            if forces.settled:
+            # At least one iteration: with the forces of an earlier geometry update, the residual may be below the round-off
+            # bound, which is common to all constraints, although gaps of constraints with a large compliance are still open.
+            last = newton(problem, start, problem.gaps(start), line_search=line_search, min_iterations=1)
+            iterations += 1 + last.iterations
+            if best is None or last.residual < best.residual:
+                best, elastic_slip = last, compliance * largest(last.y.ravel()[components[regularised]])
+            if last.settled:
                 break
         if best is not None and best.settled and elastic_slip <= SINGLE_PRECISION:
             break
@@ -105,9 +104,9 @@ def solve(
     jammed = elastic_slip > SINGLE_PRECISION
     settled = (best.settled or best.residual <= LENGTH_ROUND_OFF) and not jammed
     residual = max(best.residual, elastic_slip) if jammed else best.residual
-    gaps = best.gaps * length / unit
+    gaps = best.gaps * scale / force_units
     return FrictionSolution(
-        best.y * length * unit, gaps, best.closed, best.sticking | equality, settled, residual, iterations
+        best.y * scale * force_units, gaps, best.closed, best.sticking | equality, settled, residual, iterations
     )
 
 
@@ -159,18 +158,18 @@ class _Problem:
                 yield edge_forces, True
 
     def _by_continuation(self, y: Array) -> Array:
-        """Return forces (1 + k, m) near a solution, from `y` with a compliance that decreases to round-off.
+        """Return forces (1 + k, m) near a solution: from `y`, with an additional compliance that decreases to round-off.
 
         Where constraints are nearly dependent, such as those of two pairs on one facet, Newton's method may alternate between
-        contact states, which a compliance prevents. The compliance, relative to that of the gaps, starts at NOTABLE. It is
+        contact states. The additional compliance prevents this. Relative to that of the gaps, it starts at NOTABLE. It is
         reduced by the factor NOTABLE after each solution, or by less if the method then fails.
         """
         compliance, last, halvings = NOTABLE, 1.0, 0
         while compliance > ROUND_OFF and halvings <= HALVINGS:
             softened = replace(self, F=replace(self.F, d=self.F.d + compliance))
-            forces = newton(softened, y, softened.gaps(y), min_iterations=1)
-            if forces.settled:
-                y, last, compliance, halvings = forces.y, compliance, NOTABLE * compliance, 0
+            iterate = newton(softened, y, softened.gaps(y), min_iterations=1)
+            if iterate.settled:
+                y, last, compliance, halvings = iterate.y, compliance, NOTABLE * compliance, 0
             else:
                 compliance, halvings = float(np.sqrt(compliance * last)), halvings + 1
         return y
@@ -192,30 +191,31 @@ def numbers_at(at: Indices, shape: tuple[int, ...]) -> Indices:
 
 @record
 class Equations:
-    """The equations of closed constraints for their q forces x: ``A z = -S T free`` with ``x = -H free + back z``.
+    """Linear equations ``A z = -S T free`` for closed constraints, whose q forces are ``x = to_forces z - H free``.
 
-    They are equivalent to ``(E + D F) x = -D free`` with E and D of `Law.linearised`; see `delassus`. Without S, it is the
-    identity. The forces x are at the positions `at` (q,) in arrays (1 + k, m).
+    They are equivalent to ``(E + D F) x = -D free`` with E and D of `Law.linearised`; for H and z (r,) see `delassus`. Here
+    `free` (q,) are the gaps and slips without forces, S is the identity if None, and ``T = U.T H``. Without U, z is x. The
+    forces x are at the positions `at` (q,) in arrays (1 + k, m).
     """
 
     A: Array
     S: Array | None
     T: csr_array
     H: csr_array
-    back: csr_array
+    to_forces: csr_array
     at: Indices
 
     def forces(self, free: Array, solve: Callable[[Array], Array]) -> Array:
-        """Return the forces (1 + k, m), where `solve` solves systems with A. `free` (1 + k, m) are gaps without forces."""
+        """Return the forces (1 + k, m), given gaps and slips without forces `free` (1 + k, m) and a solver for A."""
         values = free.ravel()[self.at]
         right_side = self.T @ values if self.S is None else self.S @ (self.T @ values)
-        return scattered(self.back @ solve(-right_side) - self.H @ values, self.at, free.shape)
+        return scattered(self.to_forces @ solve(-right_side) - self.H @ values, self.at, free.shape)
 
 
 def linearised_equations(
     law: Law, F: Delassus, y: Array, gaps: Array, closed: Mask, sticking: Mask, components: Indices
 ) -> Equations:
-    """Return the equations of the `closed` constraints; F belongs to the `components`, see `solve`."""
+    """Return the equations of the `closed` constraints, linearised at `y` and `gaps`; for `components` see `solve`."""
     rows, selected = np.flatnonzero(closed), np.flatnonzero(closed[components % len(closed)])
     number, n = numbers_at(components[selected], y.shape)[:, rows], len(selected)
     shape = len(number), *number.shape
@@ -250,28 +250,28 @@ def units_of_force(F: Delassus, m: int) -> Array:
     return np.asarray(1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max())))
 
 
-def _dense_solution(A: Array, right: Array) -> Array:
-    """Return the solution of ``A x = right``, or the least-squares solution of minimum norm if A is nearly singular."""
+def _dense_solution(A: Array, right_side: Array) -> Array:
+    """Return the solution of ``A x = right_side``, or the least-squares solution of minimum norm if A is nearly singular."""
     try:
-        solution = np.linalg.solve(A, right)
+        solution = np.linalg.solve(A, right_side)
         # If A is nearly singular, the solution is so large that its round-off shows in the residual.
-        if np.abs(A @ solution - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):
+        if np.abs(A @ solution - right_side).max() <= 1e-8 * np.abs(right_side).max(initial=0.0):
             return np.asarray(solution)
     except np.linalg.LinAlgError:
         pass
-    return np.asarray(np.linalg.lstsq(A, right, rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(A, right_side, rcond=None)[0])
 
 
 def _polyhedral_forces(problem: _Problem, edges: int) -> Array | None:
-    """Return the forces (1 + k, m) for a friction cone of `edges` edges; None if Lemke's method fails or is too expensive.
+    """Return the forces (1 + k, m) for a cone with this number of `edges`; None if Lemke's method fails or is too expensive.
 
     The unknowns of the linear complementarity problem are the normal forces, the tangential forces along each edge, the
     tensile forces of equality constraints, and the largest slip along an edge (Stewart and Trinkle, 1996).
     """
     k, m = len(problem.free) - 1, problem.free.shape[1]
     equations = np.flatnonzero(problem.law.equality)
-    along_edges, last = (1 + edges) * m, (1 + edges) * m + len(equations)
-    size = last + m
+    edges_end, forces_end = (1 + edges) * m, (1 + edges) * m + len(equations)  # ends of groups of unknowns
+    size = forces_end + m
     if size > LARGEST:
         return None
     angle = 2 * np.pi * np.arange(edges) / edges
@@ -279,16 +279,16 @@ def _polyhedral_forces(problem: _Problem, edges: int) -> Array | None:
     X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), edge_directions.T]]), np.eye(m))
     X = np.hstack([X, -np.eye(len(X))[:, equations]])
     M = np.zeros((size, size))
-    M[:last, :last] = X[problem.components].T @ (problem.F @ X[problem.components])
-    M[last:, :m] = np.diag(problem.law.mu)
-    M[last:, m:along_edges] = -np.tile(np.eye(m), edges)
-    M[m:along_edges, last:] = np.tile(np.eye(m), edges).T
+    M[:forces_end, :forces_end] = X[problem.components].T @ (problem.F @ X[problem.components])
+    M[forces_end:, :m] = np.diag(problem.law.mu)
+    M[forces_end:, m:edges_end] = -np.tile(np.eye(m), edges)
+    M[m:edges_end, forces_end:] = np.tile(np.eye(m), edges).T
     # The problem of a polyhedral cone is degenerate. Its right-hand side is therefore perturbed by the fractional parts of
     # multiples of the golden ratio, which are distinct.
     q = SINGLE_PRECISION * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)
-    q[:last] += X.T @ problem.free.ravel()
+    q[:forces_end] += X.T @ problem.free.ravel()
     z, _ = lemke(M, q, 5 * size)
-    return None if z is None else (X @ z[:last]).reshape(1 + k, m)
+    return None if z is None else (X @ z[:forces_end]).reshape(1 + k, m)
 
 
 def lemke(M: Array, q: Array, max_pivots: int) -> tuple[Array | None, int]:

@@ -69,7 +69,7 @@ def solve(
         If the method fails.
     """
     tolerance = accuracy.residual or 0.0
-    problem = Eliminated(loaded, constraints, u, tolerance, inexact=not accuracy.inexact)
+    problem = Eliminated(loaded, constraints, u, tolerance, adaptive=not accuracy.inexact)
     y, gaps = problem.start(forces)
     if forces is None or not forces.any():
         sticking = closed if closed.any() else gaps[0] < 0.0
@@ -98,7 +98,8 @@ class Eliminated:
     """The equations of a contact problem for `cone_newton.newton`, with eliminated constraints; see `cone_newton.Linearised`.
 
     Forces are divided, and gaps multiplied, by the square root of the estimated stiffness of each constraint. Both then have
-    the same unit. Parameters are those of `solve`; with `inexact` the tolerance of the linear solutions varies, see `finish`.
+    the same unit. Parameters are those of `solve`; `adaptive` is whether linear solutions are only as accurate as each step
+    requires, see `_accuracy`.
 
     Attributes
     ----------
@@ -109,13 +110,13 @@ class Eliminated:
     """
 
     def __init__(
-        self, loaded: LoadedNonsymmetric, constraints: Constraints, u: Array, tolerance: float, inexact: bool
+        self, loaded: LoadedNonsymmetric, constraints: Constraints, u: Array, tolerance: float, adaptive: bool
     ) -> None:
         usable, mu = constraints.usable, constraints.friction
-        rows, free = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
+        rows, rest_gaps = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
         self._prescribed = constraints.prescribed
-        self._inexact, self._last_tolerance = inexact, tolerance
+        self._adaptive, self._last_tolerance = adaptive, tolerance
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
         unknown_compliance = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
@@ -125,14 +126,14 @@ class Eliminated:
         if self._rotation is not None:
             rotated_rows = csr_array(self._rotation @ vstack(rows, format="csr"))
             rows = tuple(rotated_rows[a * m : (a + 1) * m] for a in range(3))
-            free = cone_newton.rotated(self._rotation, free)
+            rest_gaps = cone_newton.rotated(self._rotation, rest_gaps)
             compliance = self._compliance_of_rows(rows, unknown_compliance)
         held_slips = cone_newton.held_tangents(compliance)
         prescribed = held_slips & constraints.imposes_slip(np.arange(m), self._rotation)
         self._compliance[1:] += np.where(prescribed, cone_newton.SLIP_COMPLIANCE * compliance[0, 0], 0.0)
         slip_rows = [scaled(T, np.where(is_held, 0.0, 1.0)) for T, is_held in zip(rows[1:], held_slips, strict=True)]
         self._rows = (rows[0], *slip_rows)
-        self._free = np.vstack([free[0], np.where(held_slips & ~prescribed, 0.0, free[1:])])
+        self._at_rest = np.vstack([rest_gaps[0], np.where(held_slips & ~prescribed, 0.0, rest_gaps[1:])])
         self._free_slips = ~held_slips | prescribed
         normal, estimate = compliance[0, 0], STIFFNESS_ESTIMATE / np.sqrt(max(1.0, loaded.contrast / MILD_CONTRAST))
         self._unit = np.sqrt(1.0 / (np.where(normal > 0.0, normal, 1.0) / estimate + self._compliance[0]))
@@ -143,7 +144,7 @@ class Eliminated:
     def _compliance_of_rows(self, rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
         """Return the sum of `compliance_of_rows` and the tangential compliance of the constraints themselves.
 
-        Tangents with such a compliance are thus not held. Where supports prescribe gaps, the normal compliance is added.
+        Tangents with such a compliance are thus not held. Where supports prescribe gaps, the normal compliance is added, too.
         """
         compliance = cone_newton.compliance_of_rows(rows, unknown_compliance)
         compliance[0, 0] += np.where(self._prescribed, self._compliance[0], 0.0)
@@ -153,7 +154,7 @@ class Eliminated:
 
     def start(self, forces: Array | None) -> tuple[Array, Array]:
         """Return scaled forces and gaps (1 + k, m) at the initial unknowns, given initial `forces` (1 + k, m) [force]."""
-        y = np.zeros_like(self._free) if forces is None else np.where(self._usable, forces, 0.0)
+        y = np.zeros_like(self._at_rest) if forces is None else np.where(self._usable, forces, 0.0)
         y = cone_newton.rotated(self._rotation, y)
         y[1:][~self._free_slips] = 0.0
         self.last_forces = y / self._unit
@@ -170,7 +171,7 @@ class Eliminated:
 
     def _gaps(self, u: Array, forces: Array | float = 0.0) -> Array:
         """Return gaps and slips (1 + k, m) at unknowns u (n,) [length], with the compliance under `forces` [force]."""
-        return self._free + np.stack([R @ u for R in self._rows]) + self._compliance * forces
+        return self._at_rest + np.stack([R @ u for R in self._rows]) + self._compliance * forces
 
     def _scaled(self, gaps: Array) -> Array:
         """Return scaled gaps (1 + k, m), given `gaps` [length]; constraints that cannot close get a positive gap."""
@@ -187,7 +188,7 @@ class Eliminated:
         B, nodes = csr_array(vstack(rows, format="csr")), self._nodes[equations.nonzero()[1]]
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
         friction_terms = self._friction_terms(B, np.flatnonzero(closed), sliding) if len(sliding.at) else None
-        self._last_tolerance, c, C = self._accuracy(y, gaps), -self._free[equations], self._compliance[equations]
+        self._last_tolerance, c, C = self._accuracy(y, gaps), -self._at_rest[equations], self._compliance[equations]
         u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last_tolerance, friction_terms, C)
         forces = np.zeros_like(y)
         forces[equations] = multiplier
@@ -201,7 +202,7 @@ class Eliminated:
         It is proportional to the residual of the friction law, but at most MAX_TOLERANCE: less accurate steps would change
         the directions of small slips. The last step is solved to the full tolerance.
         """
-        if not self._inexact:
+        if not self._adaptive:
             return self._tolerance
         force = float(np.abs(y).max(initial=0.0))
         residual = float(np.abs(self.law.residual(y, gaps)).max(initial=0.0))
@@ -209,7 +210,7 @@ class Eliminated:
 
     def finish(self) -> bool:
         """Use the full tolerance in further steps; return whether the last step was less accurate."""
-        self._inexact = False
+        self._adaptive = False
         return self._last_tolerance > self._tolerance
 
     def _sliding(self, y: Array, gaps: Array, at: Indices) -> _Sliding:
@@ -222,7 +223,7 @@ class Eliminated:
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(radius_ratio / np.maximum(1.0 - radius_ratio, TINY), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._compliance[1, at])  # in series with the compliance of the constraint
-        free = (across * self._free[1:, at]).sum(axis=0)
+        free = (across * self._at_rest[1:, at]).sum(axis=0)
         return _Sliding(at, ratios, Springs(csr_array(rows), spring), across, free)
 
     def _friction_terms(self, B: csr_array, closed_rows: Indices, sliding: _Sliding) -> FrictionTerms:

@@ -48,7 +48,7 @@ def solve(
     """Return the displacements and the contact forces that satisfy unilateral contact and Coulomb's law.
 
     Each constraint in F costs columns of the inverse stiffness matrix. The solution therefore starts with the constraints
-    that were closed, and others are added if they penetrate. Constraints that are never added are open and free of forces,
+    `closed`, and others are added if they penetrate. Constraints that are never added are open and free of forces,
     so that the result is that of the complete problem.
 
     Parameters
@@ -116,12 +116,12 @@ def _eliminated(
         else:
             y, closing = path.along(constraints.directions, all_rows)
             u_end = loaded.full_solution(constraints.force(y[0], y[1:].T))
-            lag = -constraints.gaps_at_rest() - np.stack([R @ u_end for R in (constraints.B, *constraints.tangents)])
-            lag -= eliminated.diagonal_compliance(constraints) * y
-            lag[0] += path.gap
-            lag = np.where(usable, lag, 0.0)
-            distance = 4.0 * largest(lag[0])  # further than constraints can close
-            result, gaps, before = in_increments(lag, closing, y, path.waiting, increment)
+            at_end = np.stack([R @ u_end for R in (constraints.B, *constraints.tangents)])
+            initial_offset = -constraints.gaps_at_rest() - at_end - eliminated.diagonal_compliance(constraints) * y
+            initial_offset[0] += path.gap
+            initial_offset = np.where(usable, initial_offset, 0.0)
+            distance = 4.0 * largest(initial_offset[0])  # further than constraints can close
+            result, gaps, before = in_increments(initial_offset, closing, y, path.waiting, increment)
             result, last_increment = replace(result, gaps=gaps), _last_increment(before, None, all_rows, constraints)
     except ConvergenceError:
         return None
@@ -204,7 +204,7 @@ class _IncludedProblem:
     Q: csr_array | None
 
     def _gap_changes(self, y: Array) -> Array:
-        """Return the gaps and slips (1 + k, q) due to forces y (1 + k, q)."""
+        """Return the changes of the gaps and slips (1 + k, q) due to forces y (1 + k, q)."""
         return scattered(self.F @ y.ravel()[self.components], self.components, y.shape)
 
     def in_increments(
@@ -215,9 +215,9 @@ class _IncludedProblem:
         `y0` and `closing` (1 + k, q) are those of `LoadPath.along`, rotated by Q.
         """
         y0[1:][self.held_slips], closing[1:][self.held_slips] = 0.0, 0.0
-        lag = -self.free - self._gap_changes(y0)
-        lag[0] += closing[0]
-        return in_increments(lag, closing, y0, waiting, self._increment)
+        initial_offset = -self.free - self._gap_changes(y0)
+        initial_offset[0] += closing[0]
+        return in_increments(initial_offset, closing, y0, waiting, self._increment)
 
     def _increment(self, offset: Array, carrying: Mask, closed: Mask, start: Array | None) -> FrictionSolution:
         """See `solution.IncrementSolver`."""

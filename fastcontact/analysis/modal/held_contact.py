@@ -78,7 +78,7 @@ class HeldContact:
 
 
 def assembled(all_conditions: Iterable[Conditions], n_dofs: int) -> HeldContact:
-    """Return all conditions together, for `n_dofs` displacements."""
+    """Return the held contact that consists of all conditions, for `n_dofs` displacements."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
     for conditions in all_conditions:
         nonempty = np.flatnonzero(np.diff(conditions.rows.indptr) > 0)
@@ -160,12 +160,12 @@ def _tangential_conditions(
     directions: Sequence[Array], rows: Sequence[csr_array], selected: Indices, nodes: Indices, areas: Array,
     compliance: csr_array | None = None,
 ) -> Conditions:  # fmt: skip
-    """Return the conditions along all tangents, with rows (k, n_dofs) for `selected` (k,) multipliers of a pair."""
+    """Return the conditions along k tangents, given the rows (q, n_dofs) of each for the `selected` (q,) multipliers."""
     k = len(rows)
-    softness = None if compliance is None else csr_array(block_diag([compliance] * k, format="csr"))
+    repeated_compliance = None if compliance is None else csr_array(block_diag([compliance] * k, format="csr"))
     stacked = csr_array(vstack(rows, format="csr"))
     tangents = np.concatenate([direction[selected] for direction in directions])
-    return Conditions(stacked, np.tile(nodes[selected], k), np.tile(areas[selected], k), tangents, softness)
+    return Conditions(stacked, np.tile(nodes[selected], k), np.tile(areas[selected], k), tangents, repeated_compliance)
 
 
 def _compliance(weights: csr_array, softness: Array) -> csr_array | None:

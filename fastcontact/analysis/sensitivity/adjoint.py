@@ -75,16 +75,16 @@ class Adjoint:
     contact : MovingContact
     gradient : Gradient
     moving : csr_array
-        Derivative of `MovingContact.sample_at` with respect to the configuration at which surfaces are paired; see
-        `MovingContact.derivatives`.
+        Derivative of `MovingContact.sample_at` with respect to the displacements (n_dofs,) at which surfaces are paired, then
+        with respect to the lift of each parameter; see `MovingContact.derivatives`.
     """
 
     def __init__(self, contact: MovingContact, gradient: Gradient, moving: csr_array) -> None:
         self._contact, self._gradient = contact, gradient
         self._system, self._solver = contact.problem.system, contact.problem.solver
         n, k = len(contact.u), len(contact.active)
-        self._moving, self._lifted, self._k = csr_array(moving[:, :n]), csr_array(moving[:, n:]), k
-        self._force, self._gap = csr_array(self._moving[:n]), csr_array(self._moving[n : n + k])
+        self._dsample, self._by_lift, self._k = csr_array(moving[:, :n]), csr_array(moving[:, n:]), k
+        self._dforce, self._dgap = csr_array(self._dsample[:n]), csr_array(self._dsample[n : n + k])
         self.solutions = 0
         self._B, self._rows, self._C = csr_array((0, n)), csr_array((0, n)), None
         if k:
@@ -96,10 +96,10 @@ class Adjoint:
         self._w, self._mu = self._solve()
 
     def derivatives(self, changes: Sequence[Change]) -> Array:
-        """Return the derivatives (q,) of the quantity with respect to parameters, whose lifts are those of `moving`."""
+        """Return the derivatives (q,) of the quantity with respect to the parameters whose lifts `moving` contains."""
         gradient, n, values = self._gradient, len(self._contact.u), np.zeros(len(changes))
-        for i, (change, lifted) in enumerate(zip(changes, self._lifted.toarray().T, strict=True)):
-            sample = change.sample + largest(change.lift) * lifted
+        for i, (change, by_lift) in enumerate(zip(changes, self._by_lift.toarray().T, strict=True)):
+            sample = change.sample + largest(change.lift) * by_lift
             residual = change.residual + self._system.K @ change.lift - sample[:n]
             gap = sample[n : n + self._k] + self._B @ change.lift
             values[i] = gradient.displacement @ change.lift - self._w @ self._system.reduced(residual) - self._mu @ gap
@@ -114,9 +114,9 @@ class Adjoint:
         # Derivatives of the quantity with respect to all unknowns (n,) and the multipliers (k,).
         right_side, multiplier = self._system.reduced(gradient.displacement), gradient.multiplier.copy()
         if gradient.sample is not None:
-            right_side += self._moving.T @ gradient.sample
+            right_side += self._dsample.T @ gradient.sample
         if gradient.reaction is not None:
-            right_side += self._system.reduced(self._system.K @ gradient.reaction) - self._force.T @ gradient.reaction
+            right_side += self._system.reduced(self._system.K @ gradient.reaction) - self._dforce.T @ gradient.reaction
             multiplier -= self._B @ gradient.reaction
         w, mu = self._saddle_point_solution(right_side, multiplier)
         pairing_terms = self._pairing_product(w, mu)
@@ -147,7 +147,7 @@ class Adjoint:
     def _pairing_product(self, w: Array, mu: Array) -> Array:
         """Return ``E.T y`` (n,)."""
         system, bodies = self._system, self._contact.problem.floating_bodies
-        product = self._gap.T @ mu - self._force.T @ (w if system.T is None else system.T @ w)
+        product = self._dgap.T @ mu - self._dforce.T @ (w if system.T is None else system.T @ w)
         if bodies is not None:
             product[bodies.dofs] -= bodies.stiffness * w[bodies.dofs]
         return product

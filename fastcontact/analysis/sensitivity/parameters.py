@@ -328,10 +328,10 @@ def _clearance_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a length that is added to the gaps of a contact pair."""
     name = str(parameter[1])
     pair = contact.problem.pairs[name]
-    count = len(pair.secondary.points)
+    n_nodes = len(pair.secondary.points)
 
     def with_increment(increment: float) -> MovingContact:
-        worn = {**contact.state.worn, name: Worn(np.full(count, increment), np.zeros(count))}
+        worn = {**contact.state.worn, name: Worn(np.full(n_nodes, increment), np.zeros(n_nodes))}
         return replace(contact, state=replace(contact.state, worn=worn))
 
     return replace(_zero_change(contact), sample=contact.parameter_derivative(with_increment, contact.increment))

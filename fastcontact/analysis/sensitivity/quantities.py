@@ -41,7 +41,7 @@ def check_quantity(model: Model, quantity: Label) -> None:
 
 
 def with_gradient(contact: MovingContact, step: StepResult, quantity: Label) -> tuple[MovingContact, Gradient]:
-    """Return the gradient of a quantity, and the contact, whose sample contains pressures if the quantity is a pressure.
+    """Return the contact, whose sample contains pressures if the quantity is a pressure, and the gradient of the quantity.
 
     `check_quantity` must have accepted the quantity. Raises ModelError if it has no sensitivities in this state.
     """
@@ -124,11 +124,11 @@ def _pressure(
     multiplier, multiplier_gradient = contact.solution.multiplier, zero.multiplier
     rows_of_pair, rows = contact.constraints.rows[name], contact.active
     change = INCREMENT * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
-    base = contact.pressure(multiplier)[row]
+    pressure = contact.pressure(multiplier)[row]
     for k in np.flatnonzero((rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)):
         increased = multiplier.copy()
         increased[rows[k]] += change
-        multiplier_gradient[k] = (contact.pressure(increased)[row] - base) / change
+        multiplier_gradient[k] = (contact.pressure(increased)[row] - pressure) / change
     sample = np.zeros(len(contact.u) + len(rows) + len(result.points))
     sample[len(contact.u) + len(rows) + row] = 1.0
-    return contact, replace(zero, value=float(base), sample=sample)
+    return contact, replace(zero, value=float(pressure), sample=sample)

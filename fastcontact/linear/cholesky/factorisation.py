@@ -131,29 +131,29 @@ class SymbolicFactors:
         start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
         values, d = np.empty(start[-1]), np.empty(n)
         sizes = factorisation_kernels.work_sizes(self._tree.parent, nodes.first, nodes.row_start)
-        source, target, updates = self._plan(A, permutation[0])
+        reused, saved, updates = self._plan(A, permutation[0])
         failed = factorisation_kernels.factorise(
             A.indptr, A.indices, A.data, *permutation, self._tree.parent, *nodes, sizes, start,
-            source, self._previous.factors, target, updates, values, d,
+            reused, self._previous.factors, saved, updates, values, d,
         )  # fmt: skip
         if failed >= 0:
             if abs(d[failed]) <= LENGTH_ROUND_OFF * A.diagonal()[permutation[0][failed]]:
                 raise singular_matrix_error()
             raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
         if self._entry_numbers is not None:
-            self._previous = OldFactors(A.data, target, (values, d, updates) if (target >= 0).any() else NO_FACTORS)
+            self._previous = OldFactors(A.data, saved, (values, d, updates) if (saved >= 0).any() else NO_FACTORS)
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
 
     def _plan(self, A: csc_array, order: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-        """Return `source` and `target` (n_supernodes,) of `factorisation_kernels.plan`, and an array for update matrices."""
+        """Return the offsets `reused` and `saved` of `factorisation_kernels.plan`, and an array for update matrices."""
         nodes, previous, size = self._supernodes, self._previous, 0
-        source, target = np.full((2, len(self._parent)), -1)
+        reused, saved = np.full((2, len(self._parent)), -1)
         if len(previous.entries):
             size = factorisation_kernels.plan(
                 A.indptr, A.data, previous.entries, order, self._parent, nodes.first, nodes.row_start, previous.offsets,
-                source, target,
+                reused, saved,
             )  # fmt: skip
-        return source, target, np.empty(size)
+        return reused, saved, np.empty(size)
 
     def _in_elimination_order(self, K: bsr_array) -> tuple[csc_array, Numbers, Numbers]:
         """Return K, its columns in the order of elimination, and the inverse; see `factorisation_kernels.factorise`.

@@ -103,11 +103,11 @@ class CoupledPivots:
     """
 
     def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
-        L = lumped_matrix(P, pivots, size)
-        ratio = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
+        lumped = lumped_matrix(P, pivots, size)
+        ratio = np.asarray(abs(lumped).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
         if not ratio.min() >= SMALLEST_LUMPED_RATIO:
             raise CoupledError()
-        self.sparse = SparseInverse(block_inverse(L))
+        self.sparse = SparseInverse(block_inverse(lumped))
         try:
             self._factors = splu(csc_array(P))
         except RuntimeError:  # exactly singular

@@ -79,7 +79,7 @@ class LoadedIterative(Loaded):
 def tighten(solver: LinearSolver, excess: float) -> bool:
     """Reduce the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`.
 
-    Return False if the tolerance is already as small as round-off permits, and is therefore not changed.
+    Return False, without any change, if the tolerance is already as small as round-off permits.
     """
     tolerance = max(solver.tolerance * REDUCTION / excess, SUM_ROUND_OFF)
     if not tolerance < solver.tolerance:

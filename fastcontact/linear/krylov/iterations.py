@@ -118,7 +118,7 @@ class ConjugateGradients(Iteration):
         if self._rz > 0.0:
             beta = -self._alpha * self.dot(self.q, self.z) / self._rz
         self._rz = rz
-        parallel_for(krylov_kernels.turn, len(self.p), WORK_PER_ENTRY, beta, self.z, self.p)
+        parallel_for(krylov_kernels.direction, len(self.p), WORK_PER_ENTRY, beta, self.z, self.p)
         multiply(self.p, self.q)
         curvature = self.dot(self.p, self.q)
         if not (rz > 0.0 and curvature > 0.0):

@@ -58,7 +58,7 @@ def advance(low, high, alpha, p, q, x, r, sums):
 
 
 @kernel
-def turn(low, high, beta, z, p):
+def direction(low, high, beta, z, p):
     """Update the search direction, ``p = z + beta p``."""
     for i in range(low, high):
         p[i] = z[i] + beta * p[i]

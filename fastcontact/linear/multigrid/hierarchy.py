@@ -60,13 +60,13 @@ class Hierarchy:
             level.P, level.R, A, modes = coarser
             del coarser
         self.coarse = CoarseLevel(A.to_scipy().tocsc())
-        self._free_bounds = [level.bound for level in self.levels]
+        self._bounds_without_equations = [level.bound for level in self.levels]
         self.set_bounds()
 
     def renewed(self, A: BlockMatrix) -> Hierarchy | None:
         """Return a hierarchy for a matrix A with the same pattern that reuses the coarser levels.
 
-        It is a symmetric preconditioner of A, and its set-up costs a fifth of that of a new hierarchy. The result is None if
+        It is a symmetric preconditioner of A, and its set-up costs a fifth of that of a complete one. The result is None if
         there are no coarser levels, or if A has a different precision.
         """
         if len(self.levels) == 1 or A.data.dtype != self.dtype:
@@ -75,7 +75,7 @@ class Hierarchy:
         finest.P, finest.R = self.levels[0].P, self.levels[0].R
         new.levels = [finest, *(level.without_equations() for level in self.levels[1:])]
         new.coarse = CoarseLevel(self.coarse.matrix)
-        new._free_bounds = [finest.bound, *self._free_bounds[1:]]
+        new._bounds_without_equations = [finest.bound, *self._bounds_without_equations[1:]]
         new.set_bounds()
         return new
 
@@ -159,7 +159,7 @@ class Hierarchy:
         """
         self.bounds = [
             max(bound, SAFETY_FACTOR * level.largest_eigenvalue()) if estimated and level.P is not None else bound
-            for level, bound in zip(self.levels, self._free_bounds, strict=True)
+            for level, bound in zip(self.levels, self._bounds_without_equations, strict=True)
         ]
 
     def cycle(self, number: int = 0) -> None:

@@ -126,10 +126,10 @@ class LoadedMultigrid(LoadedIterative):
         if C is None or not C.any():
             return _DividedEquations.of(B, c, np.zeros(len(c)), np.ones(len(c), bool), nodes, size, force_rows)
         diagonal = self._solver.diagonal()
-        flexibility = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
-        softness = B.multiply(B) @ flexibility
+        unknown_compliance = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
+        compliance = B.multiply(B) @ unknown_compliance  # of the unknowns of each equation
         try:
-            return _DividedEquations.of(B, c, C, softness > LARGEST_STIFFNESS_RATIO * C, nodes, size, force_rows)
+            return _DividedEquations.of(B, c, C, compliance > LARGEST_STIFFNESS_RATIO * C, nodes, size, force_rows)
         except DependenceError:
             return _DividedEquations.of(B, c, C, C == 0.0, nodes, size, force_rows)
 

@@ -18,8 +18,8 @@ from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, symmetric_storage_kernels
 
+# The arrays `start`, `upper` and `columns`, and the `length` of the strips, see `symmetric_storage_kernels`.
 Storage = tuple[Numbers, Numbers, Numbers, int]
-
 # Storage in which every block of the pattern is stored.
 ALL_BLOCKS: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
 # Largest number of strips into which the rows of a symmetric matrix are divided, and smallest number of rows of a strip. This
@@ -45,8 +45,8 @@ class BlockMatrix:
     low : ndarray, optional
         Low parts of the numbers of a split matrix, in single precision; `data` then contains the high parts.
     storage : tuple
-        If only a part of a symmetric matrix is stored, the blocks of the pattern `indptr`, `indices` that are stored, and
-        their order: see `symmetric_storage_kernels`.
+        Which blocks of the pattern `indptr`, `indices` are stored, and in which order; by default all of them. Of a symmetric
+        matrix, most blocks are stored only once, see `symmetric_storage_kernels`.
     """
 
     indptr: Numbers
@@ -76,9 +76,9 @@ class BlockMatrix:
         real = x.dtype.type
         entries = (self.data,) if x.dtype == self.data.dtype else self.exact_data
         if self.storage is not ALL_BLOCKS:
-            length, n = self.storage[3], len(self.indptr) - 1
+            strip, n = self.storage[3], len(self.indptr) - 1  # numbers of rows
             parallel_for(
-                symmetric_storage_kernels.multiply, -(-n // length), self.work_of_row * length, self.storage, entries, x,
+                symmetric_storage_kernels.multiply, -(-n // strip), self.work_of_row * strip, self.storage, entries, x,
                 real(factor), real(z_factor), z, y, self.rows,
             )  # fmt: skip
             return
@@ -89,7 +89,7 @@ class BlockMatrix:
 
     @property
     def work_of_row(self) -> float:
-        """Number of blocks of a row on average, see `_jit.parallel.portions`."""
+        """Average number of blocks of a row, its work in the sense of `_jit.parallel.portions`."""
         return len(self.indices) / max(1, len(self.indptr) - 1)
 
     def diagonal_blocks(self) -> Array:
@@ -150,7 +150,7 @@ def block_matrix(K: bsr_array) -> BlockMatrix:
 
 
 class ScaledMatrix:
-    """The stiffness matrix K, multiplied by a power of two for storage. Products are those with K, in double precision.
+    """The stiffness matrix K, stored after multiplication by a power of two. Products with K are in double precision.
 
     Parameters
     ----------
@@ -159,19 +159,19 @@ class ScaledMatrix:
     precision : {"single", "double"}
         Precision of the multigrid cycle. For "single", numbers are split into a high and a low part.
     release : bool
-        Whether the low parts may overwrite the numbers of K, which is empty afterwards. K and its parts are then never in
+        Whether the low parts may overwrite the numbers of K, which is empty afterwards. K and the two parts are then never in
         memory at the same time, which reduces the peak memory with a million unknowns by a tenth.
     source : ScaledMatrix, optional
-        Matrix whose unit is reused, and also its storage if the pattern is the same. By default, the unit is chosen such that
-        the largest stiffness is about one.
+        Matrix whose `scale` is reused, and also the storage scheme if the pattern is the same. By default, the scale is
+        chosen such that the largest stiffness is about one.
 
     Attributes
     ----------
     scaled : BlockMatrix
-        ``unit K``. Since the largest stiffness is about one, the numbers are within the range of single precision in any
+        ``scale K``. Since the largest stiffness is about one, the numbers are within the range of single precision in any
         system of units.
-    unit : float
-        Scaling factor, a power of two, which is exact.
+    scale : float
+        A power of two, so that the multiplication is exact.
     shape, blocksize : (int, int)
     """
 
@@ -180,31 +180,31 @@ class ScaledMatrix:
         self._store(K, precision, release, source)
 
     def _store(self, K: bsr_array, precision: str, release: bool, source: ScaledMatrix | None = None) -> None:
-        self.unit = 1.0
+        self.scale = 1.0
         if precision == "double":
             self.scaled = block_matrix(K)
             return
         if source is None:
-            size = range(K.blocksize[0])
-            largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
-            self.unit = float(0.5 ** np.round(np.log2(largest)))
+            diagonal = range(K.blocksize[0])
+            largest = block_matrix(K).diagonal_blocks()[:, diagonal, diagonal].max()
+            self.scale = float(0.5 ** np.round(np.log2(largest)))
         else:
-            self.unit = source.unit
-        self.scaled = _split_matrix(K, self.unit, release, None if source is None else source.scaled)
+            self.scale = source.scale
+        self.scaled = _split_matrix(K, self.scale, release, None if source is None else source.scaled)
 
-    def change(self, precision: str) -> None:
+    def convert(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""
         self._store(self.restored(), precision, release=True)
 
     def restored(self) -> bsr_array:
         """Return K, up to round-off."""
         K = self.scaled.to_scipy()
-        K.data /= self.unit
+        K.data /= self.scale
         return K
 
     def combine(self, factor: float, x: Array, z_factor: float, z: Array, y: Array) -> None:
         """Fill `y` (n,) with ``z_factor * z + factor * K @ x``."""
-        self.scaled.combine(factor / self.unit, x, z_factor, z, y)
+        self.scaled.combine(factor / self.scale, x, z_factor, z, y)
 
     def __matmul__(self, u: Array) -> Array:
         out = np.empty(len(u))
@@ -213,26 +213,26 @@ class ScaledMatrix:
 
     def forces_of(self, dofs: Indices, u: Array) -> Array:
         """Return the forces (n,) of displacements u (m,) of the unknowns `dofs` (m,), the others being zero [force]."""
-        return np.asarray(u @ self.scaled.rows_of(dofs) / self.unit)
+        return np.asarray(u @ self.scaled.rows_of(dofs) / self.scale)
 
     def forces_at(self, dofs: Indices, u: Array, f: Array) -> Array:
         """Return ``(K @ u - f)[dofs]`` (m,) [force]."""
-        return np.asarray(self.scaled.rows_of(dofs) @ u / self.unit - f[dofs])
+        return np.asarray(self.scaled.rows_of(dofs) @ u / self.scale - f[dofs])
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K [force / length]."""
-        size = range(self.blocksize[0])
-        return self.scaled.diagonal_blocks()[:, size, size].ravel() / self.unit
+        diagonal = range(self.blocksize[0])
+        return self.scaled.diagonal_blocks()[:, diagonal, diagonal].ravel() / self.scale
 
     def absolute_product(self, u: Array) -> Array:
         """Return ``abs(K) @ abs(u)`` (n,) [force]."""
-        return self.scaled.absolute_product(u) / self.unit
+        return self.scaled.absolute_product(u) / self.scale
 
 
-def _split_matrix(K: bsr_array, unit: float, release: bool, source: BlockMatrix | None) -> BlockMatrix:
-    """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`.
+def _split_matrix(K: bsr_array, scale: float, release: bool, source: BlockMatrix | None) -> BlockMatrix:
+    """Return ``scale K``, split into high and low parts; see `ScaledMatrix` for `release`.
 
-    The storage of the matrix `source` is used if it has the same pattern.
+    The storage scheme of the matrix `source` is used if it has the same pattern.
     """
     indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
     size, entries = K.blocksize[0], K.data if K.data.base is None else K.data.base
@@ -246,7 +246,7 @@ def _split_matrix(K: bsr_array, unit: float, release: bool, source: BlockMatrix 
         storage = symmetric_storage(indptr, indices)
     n = entries.size if storage is ALL_BLOCKS else len(storage[2]) * size * size
     high = np.empty(n, np.float32)
-    _store_parts(indptr, indices, storage, unit, entries.reshape(-1), size * size, high)
+    _store_parts(indptr, indices, storage, scale, entries.reshape(-1), size * size, high)
     with contextlib.suppress(ValueError):  # another array references the memory, which then stays allocated
         entries.resize(((n + 1) // 2,))
     low = entries.reshape(-1).view(np.float32)[:n]
@@ -254,11 +254,11 @@ def _split_matrix(K: bsr_array, unit: float, release: bool, source: BlockMatrix 
 
 
 def _store_parts(
-    indptr: Numbers, indices: Numbers, storage: Storage, unit: float, entries: AnyArray, block_size: int, high: AnyArray
+    indptr: Numbers, indices: Numbers, storage: Storage, scale: float, entries: AnyArray, size: int, high: AnyArray
 ) -> None:
-    """Fill `high` with the high parts of the stored blocks, of `block_size` numbers each, times `unit`.
+    """Fill `high` with the high parts of the stored blocks, of `size` numbers each, times `scale`.
 
-    `entries` contains the entries of all blocks. Its beginning is overwritten by the low parts.
+    `entries` contains the entries of all blocks; the low parts overwrite the beginning of this array.
     """
     start, low = indptr if storage is ALL_BLOCKS else storage[0], entries.view(np.float32)
     end, n, max_blocks = 0, len(indptr) - 1, int(np.diff(indptr).max(initial=0))
@@ -268,15 +268,15 @@ def _store_parts(
         end = max(min(n, safe_end), min(n, first + MIN_ROWS))
         work = len(indices) / n if end == safe_end else 0
         parallel_for(
-            symmetric_storage_kernels.store_rows, end - first, work, first, max_blocks, indptr, indices, storage, unit,
-            entries, block_size, high, low,
+            symmetric_storage_kernels.store_rows, end - first, work, first, max_blocks, indptr, indices, storage, scale,
+            entries, size, high, low,
         )  # fmt: skip
 
 
 def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
-    """Return the storage of a symmetric matrix.
+    """Return the storage scheme of a symmetric matrix with a given pattern.
 
-    The storage is `ALL_BLOCKS` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the strips.
+    It is `ALL_BLOCKS` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the strips.
     """
     n = len(indptr) - 1
     length = max(MIN_ROWS, -(-n // MAX_STRIPS))

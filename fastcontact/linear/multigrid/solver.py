@@ -115,11 +115,11 @@ class Multigrid:
         self._reuses_coarse_levels = False
         # Whether coarser levels may be reused; the list is shared by all copies.
         self._may_reuse_levels = [True]
-        self.begin()
+        self.reset_warm_starts()
 
-    def begin(self) -> None:
+    def reset_warm_starts(self) -> None:
         """Reset the statistics of warm starts for a new load step."""
-        # Residual norm of the last initial guess after which the iteration stopped at the largest number of warm iterations.
+        # Largest number of warm iterations, and initial residual norm of the last solution if it stopped at this number.
         self._max_warm_iterations, self._unfinished_norm = MAX_WARM_ITERATIONS, np.inf
         # Change of displacements in an iteration, divided by the decrease of the residual.
         self._change_per_residual = np.inf
@@ -172,7 +172,7 @@ class Multigrid:
         """Rebuild the hierarchy in a different precision."""
         self.precision = precision
         del self._constrained, self.hierarchy  # so that there are never two hierarchies in memory
-        self.K.change(precision)
+        self.K.convert(precision)
         self._build(self._modes.astype(float))
 
     def _inverse_entries(self, rows: Indices, columns: Indices) -> Array:
@@ -197,7 +197,7 @@ class Multigrid:
 
     def _change_hierarchy(self, sparse: Elimination | None, springs: Springs | None) -> None:
         """Change the hierarchy for equations with sparse weights, and for springs."""
-        self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
+        self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.scale))
         self._hierarchy_equations, self._hierarchy_springs = sparse, springs
 
     def solution(
@@ -231,14 +231,14 @@ class Multigrid:
             return np.zeros_like(f)
         self.constrain(elimination, springs)
         cg.x[:] = 0.0 if guess is None else guess
-        self._begin(cg, f)
+        self._start(cg, f)
         limit = self._stopping_residual(tolerance or 0.0)
         count, attempts = 0, 0
         first_monitor = MONITOR_INTERVAL if self._contrast <= MILD_CONTRAST else FIRST_MONITOR_WITH_CONTRAST
         while not self._done(cg, limit, scale):
             if self._reuses_coarse_levels and count >= COST_OF_CHANGE:
                 self._build_anew()
-                self._begin(cg, f)
+                self._start(cg, f)
             unconverged = cg.norm > limit * scale
             if count >= MAX_ITERATIONS or attempts > MAX_RAISES:
                 if not unconverged:
@@ -258,7 +258,7 @@ class Multigrid:
             else:
                 attempts += 1
                 self._make_definite(attempts)
-                self._begin(cg, f)
+                self._start(cg, f)
         return self._reduced.displacement(cg.x).copy()
 
     def nonsymmetric_solution(
@@ -297,7 +297,7 @@ class Multigrid:
         self.constrain(elimination, springs)
         limit = self._stopping_residual(tolerance)
         iteration.x[:] = guess
-        self._begin(iteration, f)
+        self._start(iteration, f)
         # If some parts are much stiffer than others, the tolerance of the solver permits large errors in the soft parts,
         # which later pairings would reduce only slowly.
         target_norm = tolerance / self._contrast * scale
@@ -427,7 +427,7 @@ class Multigrid:
         self.rebuild("double")
         self.constrain(reduced.elimination, reduced.springs)
 
-    def _begin(self, iteration: Iteration, f: Array) -> None:
+    def _start(self, iteration: Iteration, f: Array) -> None:
         """Make the iterate satisfy the equations, and compute its residual."""
         self._reduced.begin(iteration.x, f, iteration.r)
         iteration.start()
@@ -464,7 +464,7 @@ class Multigrid:
         finest = self.hierarchy.levels[0]
         scaled(1.0 / norm, r, finest.b)
         self.hierarchy.cycle()
-        scaled(norm * self.K.unit, finest.x, z)
+        scaled(norm * self.K.scale, finest.x, z)
 
     def multiplier(self, elimination: Elimination | None, u: Array, f: Array, springs: Springs | None = None) -> Array:
         """Return the multipliers (m,) of the equations [force] at the displacements `u` (n,), see `reduced.multiplier`."""

@@ -1,7 +1,7 @@
 """Nodes that constraint equations couple to a much stiffer body: corrections of the smoother and of the coarser levels.
 
 Constraint equations make the unknowns of one side, the pivots, follow the unknowns of the other side: ``u = T u``. If the
-body of the pivots is much stiffer, the nodes of the other side get its stiffness. This has two consequences:
+body of the pivots is much stiffer, its stiffness is transferred to the nodes of the other side. This has two consequences:
 
 - Motions of these nodes that move no pivot are as soft as their body, but the smoother treats them as stiff. `FreeMotions`
   corrects them with the stiffness of their body alone.
@@ -68,9 +68,8 @@ class FreeMotions:
 def follower_elimination(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
     """Return the transformation S by which the unknowns of stiffened nodes follow the pivots.
 
-    Each of these unknowns satisfies the weighted mean of the equations that contain it, with its coefficients as weights. The
-    other unknowns of its side are assumed to have the same displacement, so that common translations of both sides are
-    preserved.
+    Each of these unknowns satisfies a mean of the equations that contain it, weighted by its coefficients in them. The other
+    unknowns of its side are assumed to have the same displacement, so that common translations of both sides are preserved.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ class Amg(Multigrid, LinearSolver):
 
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with the right-hand side `f` (n,) [force], and reset the work limit."""
-        self.begin()
+        self.reset_warm_starts()
         self.work_limit = self.work + self.iteration_limit if self._may_factorise else None
         return _Loaded(self, f)
 
@@ -117,7 +117,7 @@ class Amg(Multigrid, LinearSolver):
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
-        """Return the equations and the springs for which the hierarchy was changed, as arrays, or None if there are none."""
+        """Return the equations and the springs for which the hierarchy was changed, as dicts of arrays or None."""
         equations, springs, tied = self._hierarchy_equations, self._hierarchy_springs, None
         if equations is not None:
             rows = equations.weights

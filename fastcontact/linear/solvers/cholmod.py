@@ -26,7 +26,7 @@ class Cholmod(FactorSolver):
     def _factorise(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         from kvxopt import cholmod, matrix
 
-        factor = factorise(lower_triangle(K.tocsr()), matrix(fill_reducing_order(K, last)))  # rows are columns
+        factor = factorise(lower_triangle(K.tocsr()), matrix(fill_reducing_order(K, last)))  # K is symmetric
         # CHOLMOD may reorder independent branches of the elimination tree, which does not affect the factors.
         position = np.empty(self.n, np.intp)
         position[_elimination_order(factor, self.n)] = np.arange(self.n)

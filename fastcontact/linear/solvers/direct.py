@@ -36,7 +36,7 @@ class Direct(FactorSolver):
         return symbolic.factors(K)
 
     def copy_for_similar_matrix(self) -> Self:
-        """See `LinearSolver.near`."""
+        """See `LinearSolver.copy_for_similar_matrix`."""
         copied = super().copy_for_similar_matrix()
         copied._of_tangents = True
         return copied

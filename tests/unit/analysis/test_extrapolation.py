@@ -12,27 +12,27 @@ from fastcontact.analysis.extrapolation import Extrapolation
 def after_two_steps(loads=(1.0, 2.0)):
     found = Extrapolation()
     for factor in loads:
-        found = found.to(np.zeros(3), factor * np.arange(3.0))
+        found = found.to_loads(np.zeros(3), factor * np.arange(3.0))
         gap, force = np.array([1.0 - 0.4 * factor, 0.0, 0.0, np.inf]), np.array([0.0, factor, 1.2 - 0.5 * factor, 0.0])
-        found = found.converged(factor * np.ones(3), {"c": (gap, force)})
+        found = found.after(factor * np.ones(3), {"c": (gap, force)})
     return found
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(3.0, 3.0), (2.5, 2.5), (4.0, 4.0), (9.0, 2.0), (1.0, 2.0)])
 def test_displacements_go_on_with_the_loads_but_not_far_and_not_back(factor, expected):
-    found = after_two_steps().to(np.zeros(3), factor * np.arange(3.0))
+    found = after_two_steps().to_loads(np.zeros(3), factor * np.arange(3.0))
     assert found.predicted(2.0 * np.ones(3), degree=1) == pytest.approx(expected * np.ones(3))
 
 
 def test_the_middle_of_a_step_is_on_a_parabola_or_on_a_line():
     begin, end = 4.0 * np.ones(3), 9.0 * np.ones(3)
-    found = after_two_steps().to(np.zeros(3), 4.0 * np.arange(3.0))  # u = 1 at -1, 4 at 0 and 9 at 2
+    found = after_two_steps().to_loads(np.zeros(3), 4.0 * np.arange(3.0))  # u = 1 at -1, 4 at 0 and 9 at 2
     assert found.midway(begin, end) == pytest.approx((4.0 + 17.0 / 6.0 - 1.0 / 6.0) * np.ones(3))
-    assert found.to(np.zeros(3), 0.0 * np.arange(3.0)).midway(begin, end) == pytest.approx(6.5 * np.ones(3))
+    assert found.to_loads(np.zeros(3), 0.0 * np.arange(3.0)).midway(begin, end) == pytest.approx(6.5 * np.ones(3))
 
 
 def test_constraints_close_and_open_where_gaps_and_forces_change_sign():
-    found = after_two_steps().to(np.zeros(3), 3.0 * np.arange(3.0))
+    found = after_two_steps().to_loads(np.zeros(3), 3.0 * np.arange(3.0))
     last = np.array([False, True, True, False])
     assert found.active("c", last).tolist() == [True, True, False, False]
     assert found.active("other", last) is last
@@ -40,7 +40,7 @@ def test_constraints_close_and_open_where_gaps_and_forces_change_sign():
 
 
 def test_the_first_two_steps_start_from_the_last_state():
-    found = Extrapolation().to(np.ones(2)).converged(np.ones(2), {}).to(2.0 * np.ones(2))
+    found = Extrapolation().to_loads(np.ones(2)).after(np.ones(2), {}).to_loads(2.0 * np.ones(2))
     u = np.ones(2)
     assert found.predicted(u, degree=1) is u
 
@@ -49,29 +49,29 @@ def test_displacements_and_forces_are_each_compared_with_their_own():
     """A step moved by forces, then steps moved by supports: lengths are not subtracted from forces."""
     found = Extrapolation()
     for lift, force in ((0.0, 1e6), (1e-3, 1e6)):
-        found = found.to(np.full(2, lift), np.full(2, force)).converged(np.ones(2), {})
-    found = found.to(np.full(2, 3e-3), np.full(2, 1e6))
+        found = found.to_loads(np.full(2, lift), np.full(2, force)).after(np.ones(2), {})
+    found = found.to_loads(np.full(2, 3e-3), np.full(2, 1e6))
     assert found.ratio == pytest.approx(2.0)
     constant = Extrapolation()
     for force in (1.0, 2.0):
-        constant = constant.to(np.ones(2), np.full(2, force)).converged(np.ones(2), {})
-    assert constant.to(np.ones(2), np.full(2, 2.5)).ratio == pytest.approx(0.5)
+        constant = constant.to_loads(np.ones(2), np.full(2, force)).after(np.ones(2), {})
+    assert constant.to_loads(np.ones(2), np.full(2, 2.5)).ratio == pytest.approx(0.5)
 
 
 def test_what_a_file_keeps_is_what_was_there_and_earlier_files_tell_less():
     found = after_two_steps()
     u, loads = found.states[-1][0], (np.zeros(3), 3.0 * np.arange(3.0))
     again = Extrapolation.from_dict(found.to_dict(), u)
-    assert again.to(*loads).ratio == found.to(*loads).ratio == 1.0
+    assert again.to_loads(*loads).ratio == found.to_loads(*loads).ratio == 1.0
     kept = found.to_dict()
     kept["loads"] = [parts[1] for parts in kept["loads"]]
-    assert Extrapolation.from_dict(kept, u).to(*loads).ratio == 0.0
+    assert Extrapolation.from_dict(kept, u).to_loads(*loads).ratio == 0.0
 
 
 def on_a_curve(loads, path):
     found = Extrapolation()
     for factor in loads:
-        found = found.to(np.full(2, factor)).converged(path(factor), {}, curve=True)
+        found = found.to_loads(np.full(2, factor)).after(path(factor), {}, curved=True)
     return found
 
 
@@ -80,24 +80,24 @@ def test_a_smooth_path_is_continued_by_polynomials_of_ascending_degree(loads):
     def path(factor):
         return np.array([1.0 + factor + 0.5 * factor**3, -(factor**2)])
 
-    early = on_a_curve(loads[:2], path).to(np.full(2, loads[2]))
+    early = on_a_curve(loads[:2], path).to_loads(np.full(2, loads[2]))
     assert np.array_equal(early.predicted(path(loads[1])), early.predicted(path(loads[1]), degree=1))  # a line
     end = loads[-1] + 0.5
-    found = on_a_curve(loads, path).to(np.full(2, end))
+    found = on_a_curve(loads, path).to_loads(np.full(2, end))
     assert found.predicted(path(loads[-1])) == pytest.approx(path(end), rel=1e-13)
     assert found.predicted(path(loads[-1]), degree=1) != pytest.approx(path(end), rel=1e-2)
-    again = Extrapolation.from_dict(on_a_curve(loads, path).to_dict(), path(loads[-1])).to(np.full(2, end))
+    again = Extrapolation.from_dict(on_a_curve(loads, path).to_dict(), path(loads[-1])).to_loads(np.full(2, end))
     assert np.array_equal(again.predicted(path(loads[-1])), found.predicted(path(loads[-1])))
 
 
 def test_the_degree_does_not_grow_where_a_path_is_not_smooth():
-    zigzag = on_a_curve(range(1, 8), lambda factor: np.full(2, factor + 0.3 * (factor % 2))).to(np.full(2, 8.0))
+    zigzag = on_a_curve(range(1, 8), lambda factor: np.full(2, factor + 0.3 * (factor % 2))).to_loads(np.full(2, 8.0))
     assert zigzag.degree == 1
     assert zigzag.predicted(np.full(2, 7.3)) == pytest.approx(np.full(2, 8.6))
 
 
 def test_a_kinked_path_is_continued_along_a_line():
-    found = on_a_curve((1.0, 2.0, 3.0, 4.0), lambda factor: np.full(2, factor - (factor > 2.0))).to(np.full(2, 5.0))
+    found = on_a_curve((1.0, 2.0, 3.0, 4.0), lambda f: np.full(2, f - (f > 2.0))).to_loads(np.full(2, 5.0))
     assert found.predicted(np.full(2, 3.0)) == pytest.approx(np.full(2, 4.0))
 
 

@@ -435,7 +435,7 @@ def test_the_loop_allocates_nothing_that_grows_with_the_problem(compliance):
     elimination = replace(eliminate(contact_rows(fixed), np.full(6, 1e-3)), compliance=compliance)
     solver.solution(f, elimination, None)  # compiles
     solver.constrain(elimination)
-    solver._begin(solver._cg, f)
+    solver._start(solver._cg, f)
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
     tracemalloc.reset_peak()
@@ -461,7 +461,7 @@ def test_a_bound_that_is_too_low_is_noticed_and_raised(caplog):
     solver, f, _ = prepared()
     for level in solver.hierarchy.levels:
         level.bound *= 0.3
-    solver.hierarchy._free_bounds = [level.bound for level in solver.hierarchy.levels]
+    solver.hierarchy._bounds_without_equations = [level.bound for level in solver.hierarchy.levels]
     solver.hierarchy.set_bounds()
     with caplog.at_level(logging.INFO, logger="fastcontact"):
         u = solver.load(f).full_solution(np.zeros(len(f)))

@@ -69,9 +69,9 @@ def test_products_are_those_of_the_matrix(n, size, precision, release, monkeypat
     np.testing.assert_array_less(
         np.abs(given.forces_at(some, u, f) - (dense @ u - f)[some]), EXACT * (size_of_rows + np.abs(f))[some]
     )
-    np.testing.assert_allclose(given.scaled.rows_of(some).toarray() / given.unit, dense[some], rtol=EXACT)
+    np.testing.assert_allclose(given.scaled.rows_of(some).toarray() / given.scale, dense[some], rtol=EXACT)
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
-    given.change("double" if precision == "single" else "single")
+    given.convert("double" if precision == "single" else "single")
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=2 * EXACT)
 
 
@@ -110,7 +110,7 @@ def test_blocks_stored_once_multiply_as_if_all_were(size, length, monkeypatch):
     K = matrix(40, size)
     A, rng = ScaledMatrix(K, "single").scaled, np.random.default_rng(7)
     dense = A.to_scipy().toarray()
-    np.testing.assert_allclose(dense, ScaledMatrix(K, "single").unit * K.toarray(), rtol=EXACT)
+    np.testing.assert_allclose(dense, ScaledMatrix(K, "single").scale * K.toarray(), rtol=EXACT)
     assert np.array_equal(dense, dense.T)
     start, upper, columns, _ = A.storage
     for i in range(40):
