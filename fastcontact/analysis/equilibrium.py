@@ -69,11 +69,11 @@ class SpringForces(Term):
 
 
 class FollowingForce(Term):
-    """Force of a pressure that follows the deformed surface, minus the constant force that is included elsewhere.
+    """Change of the force of a pressure that follows the deformed surface; its constant part is included elsewhere.
 
     For a load, the external forces of the step include the force on the undeformed surface. For a fluid between contact
-    surfaces, the linearised contact problem includes the force at the displacements about which it is linearised. The term
-    is therefore the force at these displacements, `at`, minus the force at the current displacements.
+    surfaces, the linearised contact problem includes the force at the displacements about which it is linearised. The term,
+    an internal force, is therefore the force at these displacements, `at`, minus that at the current displacements.
 
     Parameters
     ----------

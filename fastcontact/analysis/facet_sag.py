@@ -1,4 +1,4 @@
-"""Warnings about straight facets on curved surfaces: the estimated error in pressure due to their sag.
+"""Warnings about facets on curved surfaces: estimated pressure errors due to their sag, the deviation from the true arc.
 
 On an elastic half plane, a gap that varies by d over the length L changes pressures by the order of E d / L with Young's
 modulus E, independently of the interference. This estimate is heuristic and calibrated below. Between linear facets, d is

@@ -347,7 +347,7 @@ def newton_step(
         return None
     contact, gaps = dofs.contact, np.zeros((1 + len(constraints.tangents), len(constraints)))
     motion, force = np.zeros((2, len(u)))
-    nodal_motion = step.problem.displacement(motion)
+    nodal_motion = step.problem.displacement(motion)  # a view
 
     def response_along(v: Array) -> Array:
         """Return the active components (k,) of ``S'(u) v`` for changes v of the components on which contact depends."""

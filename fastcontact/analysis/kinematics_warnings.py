@@ -123,8 +123,8 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     for name, rows in cell_portions(mesh):
         element, nodes = elements.get(name), mesh.cells[name][rows]
         centre = element.nodes[: element.n_corners].mean(axis=0)[None]
-        slopes, _ = slopes_at(displacement[nodes], mesh.points[nodes], element.gradient(centre))
-        squares = ((slopes - slopes.transpose(0, 1, 3, 2)) ** 2).sum(axis=(1, 2, 3)) / 8.0
+        gradients, _ = slopes_at(displacement[nodes], mesh.points[nodes], element.gradient(centre))
+        squares = ((gradients - gradients.transpose(0, 1, 3, 2)) ** 2).sum(axis=(1, 2, 3)) / 8.0
         if squares.max() > square:
             square, point = squares.max(), mesh.points[nodes[squares.argmax()]].mean(axis=0)
     return float(square**0.5), point
@@ -202,17 +202,17 @@ def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
     neglected, work_by_body = np.zeros((2, n_bodies))
     for name, rows in cell_portions(mesh):
         (N, dN, weights), cells = elements.get(name).tables, mesh.cells[name][rows]
-        slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
+        gradient, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
         stress, volume = N @ last.stress[cells], np.abs(volume) * weights
         stress_tensor = stress[..., PAIRS[mesh.dim]]
-        strain_work = np.einsum("cqij,cqij->cq", stress_tensor, slope)
+        strain_work = np.einsum("cqij,cqij->cq", stress_tensor, gradient)
         if axisymmetric:
             radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
             volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_u / radius
-        rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
+        rotation = 0.5 * (gradient - gradient.transpose(0, 1, 3, 2))
         # The neglected strain is 0.5 Q.T @ Q = -0.5 Q @ Q, since the rotation Q is antisymmetric.
         neglected_work = -0.5 * np.einsum("cqij,cqij->cq", stress_tensor, rotation @ rotation)
-        strain, rotated = (np.einsum("cqij,cqij->cq", part, part) for part in (slope - rotation, rotation))
+        strain, rotated = (np.einsum("cqij,cqij->cq", part, part) for part in (gradient - rotation, rotation))
         neglected_work[strain < SINGLE_PRECISION**2 * rotated] = 0.0  # stresses of a rigid-body motion are round-off
         np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
         np.add.at(work_by_body, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))

@@ -95,13 +95,13 @@ def settle_heat(
             return replace(temperatures, balance={**temperatures.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, temperatures.rise)
         equilibrium = solve(thermal_load(problem, load, rise), equilibrium)
-    size, accepted = largest(temperatures.rise), ""
+    size, advice = largest(temperatures.rise), ""
     if change < NOTABLE * size:
-        accepted = f", or accept this accuracy with Criteria(geometry={2 * change / size:.0e})"
+        advice = f", or accept this accuracy with Criteria(geometry={2 * change / size:.0e})"
     raise ConvergenceError(
         f"heat and contact do not converge: after {limit} exchanges, temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
-        f"conductance fall gradually with the gap, or grow from zero with the pressure{accepted}",
+        f"conductance fall gradually with the gap, or grow from zero with the pressure{advice}",
         [] if equilibrium.settled is None else equilibrium.settled.iterate.history,
     )
 

@@ -70,7 +70,7 @@ class FieldCompliance:
 
     @classmethod
     def none(cls, m: int) -> FieldCompliance:
-        """Return the compliance of m equations without compliance."""
+        """Return a compliance of zero for m equations."""
         identity = csr_array(diags_array(np.ones(m)))
         return cls(identity, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
 

@@ -63,23 +63,23 @@ class Law:
 
         The radius is ``mu * max(n - g, 0)``.
         """
-        n, t = y[0] - gaps[0], y[1:] - gaps[1:]
-        return n, t, np.sqrt((t * t).sum(axis=0)), self.mu * np.maximum(n, 0.0)
+        n_trial, t_trial = y[0] - gaps[0], y[1:] - gaps[1:]
+        return n_trial, t_trial, np.sqrt((t_trial * t_trial).sum(axis=0)), self.mu * np.maximum(n_trial, 0.0)
 
     def residual(self, y: Array, gaps: Array) -> Array:
         """Return the complementarity function (1 + k, m), which vanishes at the solution.
 
         Its rows are ``n - max(n - g, 0)`` and ``t - P(t - s)``, where P is the projection onto the friction disc.
         """
-        n, t, norm, radius = self.trial(y, gaps)
+        n_trial, t_trial, norm, radius = self.trial(y, gaps)
         scale = np.divide(radius, norm, out=np.ones_like(norm), where=norm > radius)
-        normal = np.where(self.equality, n, np.maximum(n, 0.0))
-        return np.vstack([y[0] - normal, y[1:] - t * scale])
+        normal = np.where(self.equality, n_trial, np.maximum(n_trial, 0.0))
+        return np.vstack([y[0] - normal, y[1:] - t_trial * scale])
 
     def state(self, y: Array, gaps: Array) -> tuple[Mask, Mask]:
         """Return which constraints (m,) are closed, and which (m,) of the closed ones stick."""
-        n, _, norm, radius = self.trial(y, gaps)
-        return (n > 0) | self.equality, (n > 0) & (norm <= radius) & (self.mu > 0)
+        n_trial, _, norm, radius = self.trial(y, gaps)
+        return (n_trial > 0) | self.equality, (n_trial > 0) & (norm <= radius) & (self.mu > 0)
 
     def sliding_directions(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
         """Return the directions d of t - s and their influence on t, at the constraints numbered `sliding` (q,).
@@ -92,9 +92,9 @@ class Law:
             Derivative of t with respect to the component of t - s perpendicular to d: the radius of the friction disc over
             the norm of t - s, at most 1.
         """
-        _, t, norm, radius = self.trial(y, gaps)
+        _, t_trial, norm, radius = self.trial(y, gaps)
         length = np.maximum(norm[sliding], TINY)
-        return t[:, sliding] / length, np.minimum(radius[sliding] / length, 1.0)
+        return t_trial[:, sliding] / length, np.minimum(radius[sliding] / length, 1.0)
 
     def linearised(self, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
         """Return E and D (1 + k, 1 + k, q) of the equations ``E y + D gaps = 0`` of the closed constraints `rows` (q,).

@@ -289,7 +289,7 @@ def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     if not (symmetric and ascending.all() and diagonal.sum() == n):
         return ALL_BLOCKS
     stored = ~below
-    rows, rank = row[stored], (diagonal + np.int32(2) * above)[stored]
+    rows, rank = row[stored], (diagonal + np.int32(2) * above)[stored]  # rank: order of the groups in a row
     columns = indices[stored][np.argsort(np.int64(3) * rows + rank, kind="stable")]
     start = pointers(np.bincount(rows, minlength=n).astype(np.int32))
     upper = start[1:] - np.bincount(row[above], minlength=n).astype(np.int32)

@@ -361,8 +361,8 @@ class Multigrid:
         """Iterate until the residual is at most the `tolerance` times `scale` [force].
 
         An initial guess may satisfy this tolerance although the forces in a small contact area are still inaccurate. Some
-        further iterations are therefore performed, see WARM_REDUCTION. They continue until the norm of the residual is
-        `target_norm`, if this is smaller.
+        further iterations are therefore performed, see WARM_REDUCTION. Within the same limits, they continue until the norm
+        of the residual has fallen to `target_norm`.
         """
         limit = tolerance * scale
         count, target = 0, max(min(limit, WARM_REDUCTION * iteration.norm, target_norm), WARM_RESIDUAL * limit)
