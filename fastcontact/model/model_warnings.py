@@ -143,9 +143,9 @@ def _proportions(model: Model, motion: float) -> Iterator[str]:
 
 
 def _largest_motion(supports: Supports) -> Array:
-    """Return the largest prescribed displacements (dim,) along their ramps, or at multiplier 1 without a ramp [length].
+    """Return the largest magnitude of each prescribed displacement component (dim,) [length], without rotations.
 
-    Rotations are left out.
+    Displacements without a separate ramp are taken at multiplier 1.
     """
     translations = {ramp: values for ramp, values in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}
     peaks = [_peak(ramp) * np.abs(values).max(axis=0) for ramp, values in translations.items() if len(values)]

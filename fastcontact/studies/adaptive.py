@@ -141,10 +141,10 @@ class AdaptiveStudy(Report):
         numbers = {name: getattr(self, name) for name in ("combination", "quantity", "tolerance", "reached")}
         errors = {name: list(map(finite_or_none, values)) for name, values in self._errors().items()}
         rounds = [
-            {"n_dofs": r.n_dofs, "n_cells": r.n_cells, **r.values, **dict(zip(errors, of_round)), "seconds": r.seconds}
-            for r, of_round in zip(self.rounds, zip(*errors.values(), strict=True), strict=True)
+            {"n_dofs": r.n_dofs, "n_cells": r.n_cells, **r.values, **dict(zip(errors, values)), "seconds": r.seconds}
+            for r, values in zip(self.rounds, zip(*errors.values(), strict=True), strict=True)
         ]
-        return self.framed({**numbers, "value": self.rounds[-1].values[self.quantity], "rounds": rounds})
+        return self.with_metadata({**numbers, "value": self.rounds[-1].values[self.quantity], "rounds": rounds})
 
     def table(self) -> AnyArray:
         """Return a structured array (n_rounds,) with a row for each mesh, as ``--csv`` writes it.

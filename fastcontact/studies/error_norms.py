@@ -293,8 +293,8 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     True
     """
     model.refuse_nonlinear("error estimates are")
-    heat_factors, initial_factors = (step.iterations.get(f"{kind}_factors", ()) for kind in ("temperature", "initial"))
-    offset = model.stress_offset(heat_factors, initial_factors, temperature=step.temperature)
+    factors = [step.iterations.get(f"{kind}_factors", ()) for kind in ("temperature", "initial")]
+    offset = model.stress_offset(factors[0], factors[1], temperature=step.temperature)
     field = model.material_field()
     in_cells = CellStress(model.mesh, model.kinematics, field.moduli, step.displacement, field.treatment, offset)
     smooth = smoothed_stress(model.mesh, field, in_cells)

@@ -133,7 +133,7 @@ class Series:
     levels : list of Level
         Results of the meshes on which the case could be solved, the coarsest first.
     failed : dict of int to str
-        Reason of the failure on each other mesh, by the number of its level.
+        Reason for the failure on each other mesh, by the number of its level.
     theory : dict of str to float
         Values of the theory at equal approach, by quantity.
     reference : dict of str to float
