@@ -9,8 +9,8 @@ scatter of the mesh error. For each order p the parameters L, C and s are integr
 weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and the results for all orders are averaged, weighted by their evidence.
 The prior of p is log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of few
 meshes does not make the error bar too small. The first k meshes may be too coarse for a single power of h. The prior
-probability of k is proportional to (1/2)^k, and at least three meshes are not too coarse. The error bar is the distance from the median of L to
-the farther end of its 95 % interval. The reasons for these choices are given in docs/theory/convergence.md.
+probability of k is proportional to (1/2)^k, and at least three meshes are not too coarse. The error bar is the distance from
+the median of L to the farther end of its 95 % interval. The reasons for these choices are in docs/theory/convergence.md.
 """
 
 from __future__ import annotations
