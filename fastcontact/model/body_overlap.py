@@ -22,8 +22,8 @@ ON_SURFACE = 1e-10
 def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[int, int, float, Array]]:
     """Return (first, second, depth, position) for each ordered pair of bodies, the first of which has nodes in the second.
 
-    `depth` is the largest penetration depth of these nodes, see `depths` [length], and `position` (dim,) is the
-    position of the node with this depth [length].
+    `coordinates` (n_points, dim) are the positions of the bodies [length]. `depth` is the largest penetration depth of the
+    nodes, see `depths` [length], and `position` (dim,) is the position of the node with this depth [length].
     """
     overlaps = []
     for first, second, points, depth in depths(mesh, kinematics, coordinates):
@@ -36,11 +36,12 @@ def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[i
 def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[int, int, Indices, Array]]:
     """Yield (first, second, points (n,), depth (n,)) for each ordered pair of bodies with overlapping bounding boxes.
 
-    `points` are those outer nodes of the first body that lie in the bounding box of the second. Depths are their
-    distances to the outer surface of the second body, and zero for points outside that body [length]. The axis of an
-    axisymmetric body is not part of its surface. Facets are treated as curved. Facets of second order deviate from a
-    smooth curved surface by less than r^2 / h, where r is the rise of a facet and h its length. Depths below the sum of
-    these bounds for the facet at the point and for the closest facet are set to zero.
+    `coordinates` (n_points, dim) are the positions of the bodies [length], and `points` those outer nodes of the first body
+    that lie in the bounding box of the second. Depths are their distances to the outer surface of the second body, and zero
+    for points outside that body [length]. The axis of an axisymmetric body is not part of its surface. Facets are treated
+    as curved. Facets of second order deviate from a smooth curved surface by less than r^2 / h, where r is the rise of a
+    facet and h its length. Depths below the sum of these bounds for the facet at the point and for the closest facet are
+    set to zero.
     """
     count, body_of = bodies(mesh)
     if count < 2:

@@ -282,7 +282,10 @@ def _quadrature(mesh: Mesh) -> str:
 
 
 def _traces(nodes: Array, element: Element, xi: Array, weights: Array) -> Array:
-    """Return the integrals (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim)."""
+    """Return the integrals (n_cells,) of the squared gradients of all shape functions.
+
+    `nodes` (n_cells, n_nodes, dim) are the node positions of the cells [length], and `xi` and `weights` a quadrature rule.
+    """
     gradient, volume = gradients_at(nodes, element.gradient(xi))
     return np.asarray((gradient**2).sum(axis=(2, 3)) * np.abs(volume) @ weights)
 

@@ -219,7 +219,7 @@ class RecordingContext(SpawnContext):
 
 
 class Workers(ProcessPoolExecutor):
-    """A process pool whose workers can be terminated while they work. They end when this process ends."""
+    """A process pool whose workers can be terminated while they work, and end when the calling process ends."""
 
     def __init__(self, count: int) -> None:
         self.context = RecordingContext()

@@ -171,7 +171,10 @@ def _limit_distributions(x: Array, y: Array, floor: float, coarse: int) -> Array
 
 
 def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[float]:
-    """Return lower bound, median and upper bound of the central 95 % interval of a mixture of Student distributions."""
+    """Return lower bound, median and upper bound of the central 95 % interval of a mixture of Student distributions.
+
+    Each distribution has a `centre`, a `width` and a `weight` (n,), and `dof` degrees of freedom.
+    """
     from scipy.optimize import brentq
     from scipy.special import stdtr
 

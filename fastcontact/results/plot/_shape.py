@@ -318,9 +318,10 @@ def _intersection(plot_field: Field, step: StepResult, origin: Array, direction:
 
 
 def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
-    """Return the intersection of the cells with the plane on which `height` (n_points,) is zero, see `_intersection`.
+    """Return the intersection of cells with the plane of zero `height` (n_points,), see `_intersection`.
 
-    Each cell is divided into tetrahedra between its centre and triangles of its facets.
+    `data` (n_points, 7) are the positions, displacements and values at the points. Each cell is divided into tetrahedra
+    between its centre and triangles of its facets.
     """
     pieces, strokes = [np.empty((0, 3, 7))], [np.empty((0, 2, 7))]
     for name, block in mesh.solids.items():

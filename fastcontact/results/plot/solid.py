@@ -189,9 +189,9 @@ def shows_extreme(plot_field: Field, points: Array, view: tuple[float, float]) -
     return not bool(screen.hidden(points[[plot_field.extreme]])[0])
 
 
-def view_of_extreme(plot_field: Field, position: Array) -> tuple[float, float]:
+def view_of_extreme(plot_field: Field, points: Array) -> tuple[float, float]:
     """Return the first of VIEWS from which the extreme value of a field is visible, or the first one if there is none."""
-    return next((view for view in VIEWS if shows_extreme(plot_field, position, view)), VIEWS[0])
+    return next((view for view in VIEWS if shows_extreme(plot_field, points, view)), VIEWS[0])
 
 
 def viewer_direction(view: tuple[float, float]) -> Array:
