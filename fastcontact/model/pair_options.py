@@ -282,9 +282,9 @@ def _group_mask(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, 
     return mask
 
 
-def _function(name: str, value: Any) -> Field | None:
+def _function(caption: str, value: Any) -> Field | None:
     """Return a number or a function of position as a function that checks its result, and None unchanged."""
     if value is None:
         return None
-    check_value(name, value)
-    return partial(evaluated, value, name=name)
+    check_value(caption, value)
+    return partial(evaluated, value, name=caption)

@@ -154,7 +154,7 @@ class Assembly:
         return "", text
 
     def members(self, kind: str, name: str, location: Location) -> list[Any]:
-        """Return the points or the elements, by `kind`, of a set or a number. Raises CaseError if it is not defined."""
+        """Return the points or elements (`kind` "node" or "element") of a set or a number; CaseError if it is undefined."""
         scope, label = self.split_name(name)
         if label.isdecimal():
             return [self._item(kind, scope, int(label[:19]), location)]

@@ -68,13 +68,13 @@ def fill_triangles(
     return ax.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=limits[0], vmax=limits[1])
 
 
-def outlines(name: str, corners: Array) -> Array:
-    """Return the outlines (n, m, 2) of cells (n, n_nodes, 2) as polygons, in which curved sides are subdivided [length]."""
+def outlines(name: str, nodes: Array) -> Array:
+    """Return the outlines (n, m, 2) of cells with `nodes` (n, n_nodes, 2) as polygons; curved sides are divided [length]."""
     element = elements.get(name)
     if element.order == 1:
-        return corners[:, : element.n_corners]
+        return nodes[:, : element.n_corners]
     line = elements.get("line3").shape(np.linspace(-1.0, 1.0, CUTS, endpoint=False)[:, None])
-    return np.concatenate([np.einsum("ps,nsd->npd", line, corners[:, list(side)]) for side in element.facets], axis=1)
+    return np.concatenate([np.einsum("ps,nsd->npd", line, nodes[:, list(side)]) for side in element.facets], axis=1)
 
 
 def lattice(triangle: bool, n: int) -> tuple[Array, AnyArray]:
