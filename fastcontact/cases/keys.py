@@ -176,7 +176,7 @@ def _message_about_key(where: str, text: str) -> str:
 
 
 def list_of_tables(where: str, entries: Any) -> list[dict[str, Any]]:
-    """Return `entries`. Raises CaseError if they are not a list of tables, as ``[[where]]`` in a case file gives."""
+    """Return `entries`. Raises CaseError if they are not a list of tables, such as ``[[where]]`` in a case file."""
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise CaseError(f"'{where}' must be a list of tables: write [[{where}]] above each")
     return entries

@@ -71,8 +71,8 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
 def _curvature_tolerance(name: str, nodes: Array) -> Array:
     """Return bounds (n,) of the deviation of facets (n, k, dim) from a smooth surface through their nodes [length].
 
-    A parabola of rise r over a chord of length h deviates from a circle by about r^3 / h^2. The bound r^2 / h leaves a
-    margin for varying curvature. It is zero for linear facets, which contain no information about curvature.
+    A parabola of rise r over a chord of length h deviates from the circle of equal rise by about r^3 / h^2. The bound r^2 / h
+    leaves a margin for varying curvature. It is zero for linear facets, which contain no information about curvature.
     """
     element = elements.get(name)
     if element.order == 1:

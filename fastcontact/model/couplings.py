@@ -55,7 +55,7 @@ class Spread:
     def check(self, name: str, dim: int) -> None:
         """Raise ModelError, with the `name` of the load, if the weighting is not admissible."""
         if len(self.place) != dim:
-            raise ModelError(f"{name}: the centre of the distances, {self.place}, needs {dim} coordinates")
+            raise ModelError(f"{name}: at = {self.place} needs {dim} coordinates")
         for number in self.place:
             check_number(f"a coordinate of the point of {name}", number)
         check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
@@ -129,7 +129,7 @@ def forces_of_moment(weight: Array, positions: Array, moment: Array, caption: st
 
 @dataclass(frozen=True)
 class SpreadForce(Load):
-    """Components of a force [force] that is distributed over a group by the distances of nodes from a point on its line."""
+    """Components of a force [force] through a point, distributed over a group by the distances of nodes from this point."""
 
     KIND = "the force"
     CONSTANT = True

@@ -73,7 +73,7 @@ def _sector_ends(model: Model) -> Iterator[str]:
         n = len(np.intersect1d(nodes, model.mesh.points_of(pair.secondary)))
         if n:
             yield (
-                f"at the ends of {name}, {n} node{'s' * (n > 1)} of contact '{pair.name}' have no counterpart at the other "
+                f"at the ends of {name}, contact '{pair.name}' has {n} node{'s' * (n > 1)} without counterpart at the other "
                 "end: pressures near them may be wrong by as much as the mean pressure. Use matching meshes where contact "
                 "meets the ends"
             )

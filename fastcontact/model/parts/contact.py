@@ -417,8 +417,8 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         variant = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        others = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
-        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(variant) if f.init and f.name not in others)]
+        internal = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
+        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(variant) if f.init and f.name not in internal)]
         known += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, known, ContactError)
