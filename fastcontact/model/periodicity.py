@@ -195,9 +195,8 @@ def _closest(positions: Array, inward: Array, facets: Surface, nodes_by_type: li
     nodes, shifted_nodes = (facet_points(facets, closest.facet, closest.xi).nodes for closest in (near, shifted))
     first_facet = np.cumsum([0] + [len(block) for block in nodes_by_type])
     for row in np.flatnonzero((nodes[:, :, None] != shifted_nodes[:, None]).all(axis=(1, 2))):
-        type_number = int(np.searchsorted(first_facet, shifted.facet[row], side="right")) - 1
-        facet = shifted.facet[row] - first_facet[type_number]
-        on_facet = closest_of_types(positions[[row]], [nodes_by_type[type_number][[facet]]])
+        block = int(np.searchsorted(first_facet, shifted.facet[row], side="right")) - 1
+        on_facet = closest_of_types(positions[[row]], [nodes_by_type[block][[shifted.facet[row] - first_facet[block]]]])
         for values, value in zip(near, on_facet, strict=True):
             values[row] = value[0]
         near.facet[row] = shifted.facet[row]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import itertools
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -167,10 +166,10 @@ def combinations(
         selected = [name for name in ALL_ELEMENTS if can_mesh(settings, name)]
     if formulations is not None and settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    selected_formulations = [settings.case_combination.formulation] if formulations is None else list(formulations)
-    if selected_formulations == ["all"]:
-        selected_formulations = list(FORMULATIONS)
-    return tuple(_make_combination(*names) for names in itertools.product(selected, selected_formulations))
+    formulation_names = [settings.case_combination.formulation] if formulations is None else list(formulations)
+    if formulation_names == ["all"]:
+        formulation_names = list(FORMULATIONS)
+    return tuple(_make_combination(element, formulation) for element in selected for formulation in formulation_names)
 
 
 def matching_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
