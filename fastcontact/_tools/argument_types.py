@@ -251,7 +251,7 @@ def type_test(annotation: Any) -> TypeTest:
     if annotation in (None, type(None)):
         return TypeTest(lambda value: value is None, "None")
     if annotation in _SCALAR_NAMES:
-        return TypeTest(lambda value: _is_real(value, annotation), _SCALAR_NAMES[annotation])
+        return TypeTest(lambda value: _is_scalar(value, annotation), _SCALAR_NAMES[annotation])
     if origin in (tuple, list, abc.Sequence, abc.Iterable, abc.Collection):
         return _sequence_test(origin, members)
     if origin in (abc.Mapping, dict):
@@ -314,7 +314,7 @@ def _mapping_test(members: tuple[Any, ...]) -> TypeTest:
                 and all(map(values.fits, value.values())), f"a dictionary{of_values} by name")  # fmt: skip
 
 
-def _is_real(value: Any, kind: type) -> bool:
+def _is_scalar(value: Any, kind: type) -> bool:
     """Return whether a value is acceptable as a Boolean, an integer or a number, according to `kind`."""
     if isinstance(value, np.ndarray) and value.shape == () and value.dtype.kind in "iuf":
         return True

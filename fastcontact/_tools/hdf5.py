@@ -94,7 +94,7 @@ def check_contents(file: Any, path: PathLike) -> None:
 
 
 def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
-    """Return the size of a data set [byte]. Raises FileError if it is in another file or implausibly large."""
+    """Return the size of a data set [byte]. Raises FileError, with its location `where`, if it is external or too large."""
     from h5py import h5d, h5z
 
     settings = dataset.get_create_plist()
@@ -123,7 +123,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
 
 
 def check_size(where: str, shape: tuple[int, ...], file: Any) -> None:
-    """Raise FileError if an array of doubles assembled from a file is too large for the size of the file."""
+    """Raise FileError if an array of doubles, called `where`, is too large for the size of the file with its data."""
     size = 8 * int(np.prod(shape, dtype=object))
     if size > max(PLAUSIBLE_IN_ALL, PLAUSIBLE_EXPANSION_IN_ALL * file.id.get_filesize()):
         raise FileError(f"{where} is an array of {size:.3g} bytes, too many for a file of its size: write it again")

@@ -22,9 +22,10 @@ class _PartialSlip:
     """Base class of line and point contact under a tangential load up to a peak, possibly followed by unloading.
 
     The theory is that of Mindlin and Deresiewicz (1953). Let F be the normal force, f the coefficient of friction and a the
-    contact radius. Under an initial tangential load T, the shear traction is f times the difference between the contact
-    pressure and the pressure of a smaller contact, the stick zone, whose radius is a (1 - T/(f F))^p with p = `_POWER`.
-    Unloading from a peak T* to T subtracts twice the traction of an initial load (T* - T)/2.
+    contact radius. On first loading, that is under a tangential force T which has increased from zero, the shear
+    traction is f times the difference between the contact pressure and the pressure of a smaller contact, the stick zone,
+    whose radius is a (1 - T/(f F))^p with p = `_POWER`. Unloading from a peak T* to T subtracts twice the traction that first
+    loading by (T* - T)/2 causes.
     """
 
     friction: float
@@ -37,7 +38,7 @@ class _PartialSlip:
     @property
     def stick_radius(self) -> float:
         """Radius of the stick zone, or its half-width in line contact [length] (Cattaneo 1938; Mindlin 1949)."""
-        return self._stick_radius(self._reversal if self._reversal > 0.0 else self.tangential_force)
+        return self._stick_radius(self._half_reduction if self._half_reduction > 0.0 else self.tangential_force)
 
     def unloaded_to(self, tangential_force: float) -> Self:
         """Return the contact after the tangential force has been reduced from its peak to `tangential_force`.
@@ -53,8 +54,8 @@ class _PartialSlip:
         return replace(self, tangential_force=force)
 
     @property
-    def _reversal(self) -> float:
-        """Initial load (T* - T)/2 whose traction is subtracted twice on unloading from the peak T* to the current force T."""
+    def _half_reduction(self) -> float:
+        """Half of the reduction of the tangential force, (T* - T)/2, from the peak T* to the current force T."""
         return 0.5 * (self.tangential_force_peak - self.tangential_force)
 
     @property
@@ -63,26 +64,26 @@ class _PartialSlip:
         return self.friction * self.normal.force
 
     def _stick_radius(self, load: float) -> float:
-        """Return the radius or half-width [length] of the stick zone under an initial load."""
+        """Return the radius or half-width [length] of the stick zone on first loading by the tangential force `load`."""
         return self.normal.radius * max(1.0 - load / self._limit, 0.0) ** self._POWER
 
     def _at_current_force(self, quantity: Callable[[float], Any]) -> Any:
-        """Return a quantity at the current force, from the function `quantity` of an initial load."""
-        return quantity(self.tangential_force_peak) - 2.0 * quantity(self._reversal)
+        """Return a quantity at the current force; `quantity` is its function of the tangential force on first loading."""
+        return quantity(self.tangential_force_peak) - 2.0 * quantity(self._half_reduction)
 
     def _traction(self, name: str, position: ArrayLike) -> Array:
         """Return the shear traction [pressure] at the current force; error messages call the position `name`.
 
-        Under an initial load, it is f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] with the stick radius c, where the
+        On first loading, it is f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] with the stick radius c, where the
         root of a negative number is replaced by zero.
         """
         x2, a = array(name, position) ** 2, self.normal.radius
 
-        def initial_traction(load: float) -> Array:
+        def traction_on_loading(load: float) -> Array:
             roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(self._stick_radius(load) ** 2 - x2, 0.0))
             return self.friction * self.normal.pressure_max / a * roots
 
-        return np.asarray(self._at_current_force(initial_traction))
+        return np.asarray(self._at_current_force(traction_on_loading))
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ class CattaneoMindlinLine(_PartialSlip):
 
     The formulas are those of Johnson (1985), section 7.2(a). The attribute `normal` is the normal contact, a `HertzLine`,
     and `friction` the coefficient of friction. `tangential_force` is the current tangential force and
-    `tangential_force_peak` its largest value so far; they are equal during loading [force/length].
+    `tangential_force_peak` its largest value so far; they are equal on first loading [force/length].
     """
 
     normal: HertzLine
@@ -114,18 +115,18 @@ class CattaneoMindlinLine(_PartialSlip):
     def slip_displacement(self) -> float:
         """Part [length] of the tangential displacement of distant points that is due to slip.
 
-        During loading it is f F/(pi E*) [(1 - t) ln(1 - t) + t] with t = T/(f F). This is the integral over the tangential
+        On first loading it is f F/(pi E*) [(1 - t) ln(1 - t) + t] with t = T/(f F). This is the integral over the tangential
         force of the compliance of a strip that sticks for ``|x| < c = a sqrt(1 - t)``, which is -2/(pi E*) ln c up to a
         constant (from Johnson 1985, eq. 2.25). The elastic part of the displacement is proportional to the force and depends
         on the distant supports of the bodies; it is not included.
         """
 
-        def initial_slip(load: float) -> float:
+        def slip_on_loading(load: float) -> float:
             remainder = max(1.0 - load / self._limit, 0.0)
             logarithm = remainder * math.log(remainder) if remainder > 0.0 else 0.0
             return self._limit / (math.pi * self.normal.E_star) * (logarithm + 1.0 - remainder)
 
-        return float(self._at_current_force(initial_slip))
+        return float(self._at_current_force(slip_on_loading))
 
     def _slip(self, c: float, x: ArrayLike) -> Array:
         """Return the slip (...) [length] at `x` (...) [length] for a stick zone of half-width c."""
@@ -161,7 +162,7 @@ class CattaneoMindlinSphere(_PartialSlip):
     def tangential_displacement(self) -> float:
         """Relative tangential displacement [length] of distant points (Mindlin 1949; Johnson 1985, section 7.2(b)).
 
-        During loading it is 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
+        On first loading it is 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
         """
         factor, a = 3.0 * self._limit / (16.0 * self.normal.radius * self.G_star), self.normal.radius
         return float(self._at_current_force(lambda load: factor * (1.0 - (self._stick_radius(load) / a) ** 2)))

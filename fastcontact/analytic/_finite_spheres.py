@@ -95,7 +95,7 @@ def _interpolate(table: Array, x: float) -> tuple[float, float, float]:
 
 
 def _local_cubic(x: float, points: Array, values: Array) -> float:
-    """Return the value at x of the cubic polynomial through the four points around x."""
+    """Return the value at x of the cubic polynomial through the `values` at the four of the `points` around x."""
     first = np.clip(np.searchsorted(points, x) - 2, 0, len(points) - 4)
     window = slice(first, first + 4)
     return float(np.polynomial.Polynomial.fit(points[window], values[window], 3)(x))

@@ -22,9 +22,9 @@ _FAR = 4.0
 
 
 def below_surface(z: ArrayLike, a: float) -> Array:
-    """Return the depth -z (...) [length] of `z` (...) [length]; points above it due to round-off are moved onto it.
+    """Return the depth -z (...) [length] of points at `z` (...) [length] below the surface z = 0.
 
-    Raises ModelError if a point lies above the surface by more than round-off.
+    Points that lie above the surface by round-off are moved onto it. Raises ModelError for points farther above it.
     """
     depth = -array("z", z)
     if depth.size and depth.min() < -1e-9 * a:

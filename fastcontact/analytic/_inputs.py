@@ -20,7 +20,7 @@ PLANE = ("plane_strain", "plane_stress")
 
 
 def number(name: str, value: object) -> float:
-    """Return `value` as a finite float, or raise ModelError."""
+    """Return `value` as a finite float, or raise ModelError, with the `name` of the quantity."""
     # The comparison precedes the conversion, since an integer may exceed the range of floats. NaN compares false.
     magnitude: Any = abs(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
     if not magnitude < math.inf:

@@ -413,7 +413,7 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
     --------
     >>> from fastcontact import analytic
     >>> punch = analytic.flat_punch_2d(nu=0.3, half_width=1.0, force=10.0)
-    >>> round(float(punch.pressure(0.0)), 6)  # F / (pi b)
+    >>> round(float(punch.pressure(0.0)), 6)  # F / (pi a)
     3.183099
     """
     return FlatPunch2D(poisson("nu", nu), positive("half_width", half_width), positive("force", force), bool(bonded))

@@ -38,9 +38,9 @@ def contact_at_point(step: StepResult, point: int) -> tuple[ContactResult, int] 
     return None
 
 
-def _bracket_midpoint(bracket: tuple[float, float]) -> float:
+def _midpoint(bounds: tuple[float, float]) -> float:
     """Return the midpoint of the bounds of a radius [length], or the lower bound if the upper one is not finite."""
-    lower, upper = bracket
+    lower, upper = bounds
     return 0.5 * (lower + upper) if math.isfinite(upper) else lower
 
 
@@ -63,8 +63,8 @@ def _component(vector: Callable[..., Any], index: int) -> Callable[..., Any]:
 PAIR_QUANTITIES: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "force": ("force", lambda contact: np.linalg.norm(contact.force)),
     "pressure_max": ("pressure", lambda contact: contact.pressure_max),
-    "radius": ("length", lambda contact: _bracket_midpoint(contact.radius)),
-    "stick_radius": ("length", lambda contact: _bracket_midpoint(contact.stick_radius)),
+    "radius": ("length", lambda contact: _midpoint(contact.radius)),
+    "stick_radius": ("length", lambda contact: _midpoint(contact.stick_radius)),
     "torque": ("moment", lambda contact: contact.torque),
     "wear_max": ("length", lambda contact: None if contact.wear is None else contact.wear.max(initial=0.0)),
     "heat": ("power", lambda contact: None),  # `measured` reads it from the step
@@ -100,7 +100,7 @@ class Check:
         Quantity of a probe: ``"PROBE.pressure"``, ``"PROBE.shear"``, ``"PROBE.von_mises"``, ``"PROBE.temperature"``,
         ``"PROBE.stress.yy"`` or ``"PROBE.displacement.x"``. Quantity of a contact pair: ``"PAIR.force"`` and its
         component ``"PAIR.force.x"``, on the secondary side; ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or
-        ``"PAIR.stick_radius"``, the midpoint of the bracket; ``"PAIR.moment.z"``, about the middle of the contact;
+        ``"PAIR.stick_radius"``, the midpoint of the bounds; ``"PAIR.moment.z"``, about the middle of the contact;
         ``"PAIR.torque"``, of a rotating obstacle about its axis; ``"PAIR.wear_max"``, the largest wear depth; or
         ``"PAIR.heat"``, the heat flow to the primary side.
     tolerance : float

@@ -79,7 +79,8 @@ TOP_LEVEL: dict[str, Any] = {
 def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterable[str] = ()) -> None:
     """Raise CaseError unless `data` is a table with all `required` keys and no keys other than those in `known`.
 
-    The values must have the types in `known`. The type None admits any value.
+    The values must have the types in `known`; the type None admits any value. In messages, the table is called `where`, which
+    is empty for the whole file.
     """
     if not isinstance(data, dict):
         raise CaseError(f"'{where}' must be a table of keys, not {reprlib.repr(data)}")
@@ -150,7 +151,7 @@ def call_with_keys(where: str, function: Callable[..., Any], arguments: dict[str
 
 @contextlib.contextmanager
 def errors_at(where: str) -> Iterator[None]:
-    """Prefix the messages of errors raised in a ``with`` block with the table of the case file that causes them."""
+    """Prefix the messages of errors raised in a ``with`` block with `where`, the table of the case file that causes them."""
     try:
         yield
     except CaseError:
@@ -175,7 +176,7 @@ def _message_about_key(where: str, text: str) -> str:
 
 
 def list_of_tables(where: str, entries: Any) -> list[dict[str, Any]]:
-    """Return `entries`. Raises CaseError if they are not a list of tables."""
+    """Return `entries`. Raises CaseError if they are not a list of tables, such as ``[[where]]`` in a case file."""
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise CaseError(f"'{where}' must be a list of tables: write [[{where}]] above each")
     return entries

@@ -204,7 +204,7 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
 
 
 def _check_kinds(where: str, entry: Mapping[str, Any], function: Callable[..., Any]) -> None:
-    """Raise CaseError if a key of a table has another type than the Boolean argument of the same name of a function."""
+    """Raise CaseError if the value of a key is not Boolean, although the argument of this name of `function` is."""
     kinds = kinds_of(function)
     for key, value in entry.items():
         check_kind(f"{where}.{key}", value, kinds.get(key))

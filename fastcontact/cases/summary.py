@@ -321,7 +321,8 @@ def _sensitivity_line(report: Mapping[str, Any]) -> str:
     quantity = " ".join(map(str, report["quantity"]))
     if "refused" in report:
         return f"  no sensitivities of {quantity}: {report['refused']}"
-    derivatives = ", ".join(f"{d['value']:.6g} to {' '.join(map(str, d['by']))}" for d in report["derivatives"])
+    by = ((d["value"], " ".join(map(str, d["by"]))) for d in report["derivatives"])
+    derivatives = ", ".join(f"{value:.6g} with respect to {parameter}" for value, parameter in by)
     return f"  sensitivities of {quantity} (value {report['value']:.6g}): {derivatives}"
 
 

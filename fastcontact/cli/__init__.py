@@ -40,9 +40,9 @@ def entry_point() -> None:
 
     code = flush_output(code)
     if code in STOPPED:
-        for signal_code in STOPPED:  # further signals must not change the exit code
+        for exit_code in STOPPED:  # further signals must not change the exit code
             with contextlib.suppress(ValueError):  # a platform without this signal
-                signal.signal(signal_code - 128, signal.SIG_IGN)
+                signal.signal(exit_code - 128, signal.SIG_IGN)
         sys.unraisablehook = lambda ignored: None  # hides errors in finalisers of partly created objects
     else:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C may end the process now that all output is written

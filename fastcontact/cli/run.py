@@ -167,7 +167,7 @@ def _write_steps(
 
 
 def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary_path: str | None) -> None:
-    """Add a note on the number of complete steps to an error, and write both to the summary file."""
+    """Add a note on the number of complete steps to an error, and write error and number to the file `summary_path`."""
     try:
         writer.wait()
     except FileError as failure:

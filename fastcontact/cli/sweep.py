@@ -37,8 +37,8 @@ def run(options: Namespace) -> int:
         if name in parameters:
             raise CaseError(f"--set {name} is given twice: give all its values at once, as in {name}=1,2,5")
         parameters[name] = parameter_values
-    model = {"element": options.element, "formulation": options.formulation, "level": options.level}
-    sweep = _study.run_interruptibly(options, partial(parameter_sweep, options.case, parameters, **model))
+    settings = {"element": options.element, "formulation": options.formulation, "level": options.level}
+    sweep = _study.run_interruptibly(options, partial(parameter_sweep, options.case, parameters, **settings))
     return _study.report(options, sweep, "--png FILE writes a picture", [text for _, text in sweep.failed])
 
 

@@ -20,10 +20,10 @@ ON_SURFACE = 1e-10
 
 
 def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[int, int, float, Array]]:
-    """Return (first, second, depth, position) for each ordered pair of bodies whose first has nodes inside the second.
+    """Return (first, second, depth, position) for each ordered pair of bodies, the first of which has nodes in the second.
 
-    `depth` is the largest penetration depth of these nodes, see `depths` [length], and `position` (dim,) is the
-    position of the node with this depth [length].
+    `coordinates` (n_points, dim) are the positions of the bodies [length]. `depth` is the largest penetration depth of the
+    nodes, see `depths` [length], and `position` (dim,) is the position of the node with this depth [length].
     """
     overlaps = []
     for first, second, points, depth in depths(mesh, kinematics, coordinates):
@@ -36,11 +36,12 @@ def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[i
 def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[int, int, Indices, Array]]:
     """Yield (first, second, points (n,), depth (n,)) for each ordered pair of bodies with overlapping bounding boxes.
 
-    `points` are those outer nodes of the first body that lie in the bounding box of the second. Depths are their
-    distances to the outer surface of the second body, and zero for points outside that body [length]. The axis of an
-    axisymmetric body is not part of its surface. Facets are treated as curved. Facets of second order deviate from a
-    smooth curved surface by less than r^2 / h, where r is the rise of a facet and h its length. Depths below the sum of
-    these bounds for the two bodies are set to zero.
+    `coordinates` (n_points, dim) are the positions of the bodies [length], and `points` those outer nodes of the first body
+    that lie in the bounding box of the second. Depths are their distances to the outer surface of the second body, and zero
+    for points outside that body [length]. The axis of an axisymmetric body is not part of its surface. Facets are treated
+    as curved. Facets of second order deviate from a smooth curved surface by less than r^2 / h, where r is the rise of a
+    facet and h its length. Depths below the sum of these bounds for the facet at the point and for the closest facet are
+    set to zero.
     """
     count, body_of = bodies(mesh)
     if count < 2:
@@ -70,8 +71,8 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
 def _curvature_tolerance(name: str, nodes: Array) -> Array:
     """Return bounds (n,) of the deviation of facets (n, k, dim) from a smooth surface through their nodes [length].
 
-    A parabola of rise r over a chord of length h deviates from its circle by about r^3 / h^2. The bound r^2 / h leaves a
-    margin for varying curvature. It is zero for straight facets, which contain no information about curvature.
+    A parabola of rise r over a chord of length h deviates from the circle of equal rise by about r^3 / h^2. The bound r^2 / h
+    leaves a margin for varying curvature. It is zero for linear facets, which contain no information about curvature.
     """
     element = elements.get(name)
     if element.order == 1:
@@ -110,7 +111,8 @@ def winding_numbers(points: Array, pieces: Array) -> Array:
     """Return the winding number (n,) [-] of a closed surface around each of `points` (n, dim) [length]: 1 inside, 0 outside.
 
     The surface consists of `pieces` (m, dim, dim), which are lines or triangles [length]. The winding number is the sum of
-    their angles in the plane, or of their solid angles (Van Oosterom and Strackee, 1983, eq. 8), divided by a full angle.
+    the angles that the pieces subtend at the point, in 3D solid angles (Van Oosterom and Strackee, 1983, eq. 8), divided by
+    the full angle.
     Angles are positive for outward normals.
     """
     corners, numbers = np.ascontiguousarray(np.moveaxis(pieces, 0, 2)), np.empty(len(points))

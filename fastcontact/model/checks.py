@@ -85,7 +85,7 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mas
 def check_penetration(name: str, pair: Formulation) -> None:
     """Raise ContactError if the initial penetration of contact pair `name` exceeds the facet length at a node.
 
-    An intended interference is smaller than this, or is specified by the option `clearance`.
+    An intended interference is smaller than a facet, or is specified by the option `clearance`.
     """
     gap, _ = initial_gaps(pair)
     size = pair.secondary.largest_diameters(pair.points)

@@ -15,7 +15,7 @@ from fastcontact.elasticity.loads import check_number
 from fastcontact.errors import ModelError, check_known
 from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
-# Components of the force on an obstacle [force]; None for components that are prescribed. Empty if no force is given.
+# Components of the force on an obstacle [force]; None where the displacement is prescribed. Empty if no force is given.
 DrivingForce = tuple[float | None, ...]
 
 

@@ -55,7 +55,7 @@ class Spread:
     def check(self, name: str, dim: int) -> None:
         """Raise ModelError, with the `name` of the load, if the weighting is not admissible."""
         if len(self.place) != dim:
-            raise ModelError(f"{name}: the point {self.place} of the distances needs {dim} coordinates")
+            raise ModelError(f"{name}: at = {self.place} needs {dim} coordinates")
         for number in self.place:
             check_number(f"a coordinate of the point of {name}", number)
         check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
@@ -129,7 +129,7 @@ def forces_of_moment(weight: Array, positions: Array, moment: Array, caption: st
 
 @dataclass(frozen=True)
 class SpreadForce(Load):
-    """Components of a force [force] that is distributed over a group by the distance from its point of application."""
+    """Components of a force [force] through a point, distributed over a group by the distances of nodes from this point."""
 
     KIND = "the force"
     CONSTANT = True
@@ -159,7 +159,7 @@ class SpreadForce(Load):
 
 
 class Moment(ComponentLoad):
-    """Components of a moment [force times length] about the axes, on a reference point or distributed over a group."""
+    """Components of a moment [force times length] about x, y and z, on a reference point or distributed over a group."""
 
     KIND, CONSTANT = "the moment", True
     components: Mapping[int, float]

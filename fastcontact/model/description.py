@@ -47,7 +47,7 @@ def sentences(model: Any) -> Iterator[str]:
         history, times = _history(temperature.ramp), temperature.times
         if times:
             history = f", at {len(times)} instants from {times[0]:g} to {times[-1]:g}"
-        yield f"Temperature: {value} over {temperature.reference:g} in {groups}{history}."
+        yield f"Temperature: {value} (reference: {temperature.reference:g}) in {groups}{history}."
     for load in model.heat_loads:
         history = _history(load.ramp)
         if isinstance(load, TemporaryHeat) and load.temporary:
@@ -71,7 +71,7 @@ def sentences(model: Any) -> Iterator[str]:
 
 
 def _theory(model: Any) -> str:
-    """Return the kinematic assumption and the kind of the materials."""
+    """Return the assumptions about strains, and about materials or pressures."""
     nonlinear = any(isinstance(law, NonlinearElastic) for law, _ in model.materials)
     if model.strain == "finite":
         return "finite strains and pressures that follow the surface"

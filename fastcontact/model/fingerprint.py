@@ -85,7 +85,7 @@ def formulation_of_digest(model: Model, name: str, digest: str | None) -> str | 
 
 
 def _compared(pair: ContactPair) -> ContactPair:
-    """Return a pair without the options that are compared by other parts, and without Gauss points, the earlier default."""
+    """Return a pair without the options that other parts contain, and without Gauss points, the earlier default."""
     gauss = ["integration"] if pair.options.get("integration") == "gauss" else []
     return _without(pair, "surface_smoothing", "conductance", *gauss)
 
@@ -141,7 +141,7 @@ def _update(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array)
 
 
 def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
-    """Add the type of an object, the fields of a dataclass, the distances of an obstacle, and the values of a function."""
+    """Add an object to a digest: its type, the fields of a dataclass, and the values of an obstacle or a function."""
     add(type(value).__qualname__.encode())
     points = _points_of(value, mesh, points)
     is_material = isinstance(value, Material)
@@ -173,7 +173,7 @@ def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points:
 
 
 def _function_values(function: Callable[[Array], Any], points: Array) -> Any:
-    """Return the values (n,) of a function of position, or its name if it raises an error at these points."""
+    """Return the values (n,) of a function at `points` (n, dim), or its name if it raises an error there."""
     try:
         return np.asarray(function(points), float)
     except Exception:  # `Model.check` reports the errors of a user's function

@@ -122,8 +122,8 @@ class ForceDrivenObstacles:
         """Return the constraints of pair `name` with columns for the displacements of all obstacles.
 
         `constraints` were computed with the obstacle of the pair fixed at its displacement `position` (dim,) [length].
-        Slip then includes the motion of the obstacle. If the obstacle also rotates, `included_motion` (dim,) is the motion
-        in the step that the slip of `constraints` already includes [length].
+        Slip then includes the motion of the obstacle. If the obstacle also rotates, `included_motion` (dim,) is its
+        translation in the step, which the slip of `constraints` already includes [length].
         """
         number = self.number(name)
         B = self._with_columns(constraints.B, number)

@@ -27,7 +27,7 @@ def hanging_nodes_warning(model: Model) -> str:
 
 
 def _paired_by_contact(mesh: Mesh, node_group: str, facet_group: str, node: Indices, corners: Numbers) -> Mask:
-    """Return the mask (m,) of nodes of `node_group` on facets of `facet_group`, which have the `corners` (m, n_corners)."""
+    """Return the mask (m,) of nodes `node` in `node_group` on facets, with `corners` (m, n_corners), in `facet_group`."""
     in_node_group, in_facet_group = np.zeros((2, mesh.n_points), bool)
     in_node_group[mesh.points_of(node_group)] = True
     in_facet_group[mesh.points_of(facet_group)] = True

@@ -41,7 +41,7 @@ def _public(names: Iterable[str]) -> list[str]:
 
 
 class _PublicNames(type):
-    """Class whose `dir` lists the public names only, as does the `dir` of its instances."""
+    """Metaclass of a class whose `dir` lists the public names only."""
 
     def __dir__(cls) -> list[str]:
         return _public(super().__dir__())

@@ -73,7 +73,7 @@ def _sector_ends(model: Model) -> Iterator[str]:
         n = len(np.intersect1d(nodes, model.mesh.points_of(pair.secondary)))
         if n:
             yield (
-                f"at the ends of {name}, {n} node{'s' * (n > 1)} of contact '{pair.name}' have no counterpart at the other "
+                f"at the ends of {name}, contact '{pair.name}' has {n} node{'s' * (n > 1)} without counterpart at the other "
                 "end: pressures near them may be wrong by as much as the mean pressure. Use matching meshes where contact "
                 "meets the ends"
             )
@@ -143,9 +143,9 @@ def _proportions(model: Model, motion: float) -> Iterator[str]:
 
 
 def _largest_motion(supports: Supports) -> Array:
-    """Return the largest prescribed displacements (dim,) along their ramps, or at multiplier 1 without a ramp [length].
+    """Return the largest magnitude of each prescribed displacement component (dim,) [length], without rotations.
 
-    Rotations are left out.
+    Displacements without a separate ramp are taken at multiplier 1.
     """
     translations = {ramp: values for ramp, values in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}
     peaks = [_peak(ramp) * np.abs(values).max(axis=0) for ramp, values in translations.items() if len(values)]
@@ -282,7 +282,10 @@ def _quadrature(mesh: Mesh) -> str:
 
 
 def _traces(nodes: Array, element: Element, xi: Array, weights: Array) -> Array:
-    """Return the integrals (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim)."""
+    """Return the integrals (n_cells,) of the squared gradients of all shape functions.
+
+    `nodes` (n_cells, n_nodes, dim) are the node positions of the cells [length], and `xi` and `weights` a quadrature rule.
+    """
     gradient, volume = gradients_at(nodes, element.gradient(xi))
     return np.asarray((gradient**2).sum(axis=(2, 3)) * np.abs(volume) @ weights)
 

@@ -98,8 +98,8 @@ def pair_options(name: str, options: Mapping[str, Any], mesh: Mesh, side: Surfac
         kind=_kind(name, options, has_obstacle),
         penalty=_penalty(name, options),
         tangential_penalty=_tangential_penalty(name, options.get("tangential_penalty")),
-        search_distance=_positive(name, "search_distance", options, "any distance"),
-        wear=_positive(name, "wear", options, "none"),
+        search_distance=_positive(name, "search_distance", options, "the distance is unlimited"),
+        wear=_positive(name, "wear", options, "there is no wear"),
         conductance=Conductance(name, options["conductance"]) if "conductance" in options else None,
         friction_heat=_friction_heat(name, options),
         obstacle_temperature=options.get("obstacle_temperature"),
@@ -177,7 +177,7 @@ def _positive(name: str, option: str, options: Mapping[str, Any], default: str) 
         return None
     check_number(f"the {option} of contact '{name}'", value)
     if not value > 0:
-        raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {default}")
+        raise ContactError(f"{option} = {value} of contact '{name}' must be positive; without it, {default}")
     return float(value)
 
 
@@ -233,7 +233,7 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | 
         return ExponentialLaw(**penalty)
     if isinstance(penalty, (Sequence, np.ndarray)) and not isinstance(penalty, str):
         return TabularLaw(name, penalty)
-    return _positive(name, "penalty", options, "no penetration")
+    return _positive(name, "penalty", options, "there is no penetration")
 
 
 def _tangential_penalty(name: str, value: Any) -> Field | None:
@@ -246,7 +246,7 @@ def _positive_values(penalty: Field, name: str, positions: Array) -> Array:
     """Return the tangential penalties (n,) at `positions` (n, dim). Raises ContactError if one is not positive."""
     values = penalty(positions)
     if not (values > 0).all():
-        remedy = "leave it out for stick without elastic slip"
+        remedy = "without it, there is no elastic slip"
         raise ContactError(f"the tangential_penalty {values.min():g} of contact '{name}' must be positive; {remedy}")
     return values
 
@@ -282,9 +282,9 @@ def _group_mask(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, 
     return mask
 
 
-def _function(name: str, value: Any) -> Field | None:
+def _function(caption: str, value: Any) -> Field | None:
     """Return a number or a function of position as a function that checks its result, and None unchanged."""
     if value is None:
         return None
-    check_value(name, value)
-    return partial(evaluated, value, name=name)
+    check_value(caption, value)
+    return partial(evaluated, value, name=caption)

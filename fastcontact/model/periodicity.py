@@ -31,8 +31,8 @@ LARGEST_DISTANCE = 0.02
 class PeriodicInterface(NamedTuple):
     """Matching nodes of the two ends of a periodic part, `first` (m,) and `second` (m,).
 
-    In a ring of several `sectors`, vectors at a second node are those at the first node times `turn` (dim, dim), the matrix
-    of `rotation`; the constraint `relation` enforces this for displacements. `turn`, `rotation` and `relation` are None
+    In a ring of several `sectors`, a vector at a second node is `turn` (dim, dim), the matrix of `rotation`, times that at
+    the first node; the constraint `relation` enforces this for displacements. `turn`, `rotation` and `relation` are None
     without a rotation; `relation` is also None if other nodes of the ends do not match and are tied to facets.
     """
 
@@ -195,8 +195,8 @@ def _closest(positions: Array, inward: Array, facets: Surface, nodes_by_type: li
     nodes, shifted_nodes = (facet_points(facets, closest.facet, closest.xi).nodes for closest in (near, shifted))
     first_facet = np.cumsum([0] + [len(block) for block in nodes_by_type])
     for row in np.flatnonzero((nodes[:, :, None] != shifted_nodes[:, None]).all(axis=(1, 2))):
-        kind = int(np.searchsorted(first_facet, shifted.facet[row], side="right")) - 1
-        on_facet = closest_of_types(positions[[row]], [nodes_by_type[kind][[shifted.facet[row] - first_facet[kind]]]])
+        block = int(np.searchsorted(first_facet, shifted.facet[row], side="right")) - 1
+        on_facet = closest_of_types(positions[[row]], [nodes_by_type[block][[shifted.facet[row] - first_facet[block]]]])
         for values, value in zip(near, on_facet, strict=True):
             values[row] = value[0]
         near.facet[row] = shifted.facet[row]

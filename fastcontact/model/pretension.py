@@ -63,7 +63,7 @@ class Pretension:
         return f"the shortening of {self.name}"
 
     def row(self, n_dofs: int) -> csr_array:
-        """Return the row (1, n_dofs) that multiplies the displacements to give the shortening [-]."""
+        """Return the row (1, n_dofs) whose product with the displacements is the shortening [-]."""
         m = len(self.nodes)
         return csr_array(csr_array(np.full((1, m), 1.0 / m)) @ self._approach(self.normal, n_dofs))
 

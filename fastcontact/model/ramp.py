@@ -1,4 +1,4 @@
-"""The load ramp: the load factors at which the model is solved, and the multiplier of the loads as a function of them."""
+"""The load ramp: the load factors at which the model is solved, and the multiplier of the loads at each load factor."""
 
 from __future__ import annotations
 

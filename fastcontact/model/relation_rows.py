@@ -40,7 +40,7 @@ def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
 
 
 def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices, Array]]:
-    """Return the nodes (m,) of a group and unit vectors (m, dim) for each direction that `component` names.
+    """Return, for each direction that `component` names, the nodes (m,) of a group and unit vectors (m, dim) at these nodes.
 
     `component` is ``"normal"``, or some of the letters x, y and z.
     """
@@ -51,12 +51,12 @@ def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices,
 
 
 def rows_along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
-    """Return the rows (m, n_dofs) of the displacement of each node (m,) along its unit vector (m, dim) [-]."""
+    """Return rows (m, n_dofs) for the displacements of `nodes` (m,) along the unit vectors `directions` (m, dim) [-]."""
     return nodal_rows(nodes[:, None], directions[:, None], n_dofs)
 
 
 def relative_to_first(rows: csr_array) -> csr_array:
-    """Return the rows (m - 1, n) that follow the first of the `rows` (m, n), minus the first row."""
+    """Return the differences (m - 1, n) between the second and later ones of `rows` (m, n) and the first one."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
@@ -93,10 +93,10 @@ def matching_nodes(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation:
 
 
 class Coincident(NamedTuple):
-    """For each of n moved nodes, the row of the coincident, or the nearest, node of the other group."""
+    """For each of n moved nodes, the coincident node of the other group, or the nearest one if no node coincides."""
 
-    rows: Indices  # (n,)
-    distance: Array  # (n,): distance to this node [length]
+    rows: Indices  # (n,): index of this node in the other group
+    distance: Array  # (n,): distance to the nearest node [length]
     tolerance: float  # largest distance of coincident nodes [length]
 
 

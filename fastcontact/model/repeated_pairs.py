@@ -81,8 +81,8 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
 
     Each pair has a separate pressure at such a node, but the gap determines only the sum of the two pressures. Their
     ratio, and with it the pressure at neighbouring nodes, is arbitrary. Node-to-segment contact divides the force of a
-    node in the ratio of the areas, which is correct if both pairs have the same primary side. If the primary side is
-    divided as well, each pair faces only a part of this side.
+    node in the ratio of the areas, which is correct if both pairs have the same primary side. This does not
+    hold if the primary side is divided as well, because each pair then faces only a part of this side.
     """
     for (first, first_bound), (second, second_bound) in combinations(pairs, 2):
         if not isinstance(first_bound.primary, Surface) or not isinstance(second_bound.primary, Surface):

@@ -125,13 +125,16 @@ class FreeMotions:
         return {body: list(dict.fromkeys(motions)) for body, motions in by_body.items()}
 
     def _at_origin(self, column: Array, rows: list[int]) -> Array:
-        """Return the translation at the origin and the rotation (2, 3) of a body."""
+        """Return the translation at the origin and the rotation (2, 3) of the body with the elementary motions `rows`.
+
+        `column` (p,) are the coefficients of all elementary motions.
+        """
         translation, rotation, centre = self._translation_and_rotation(column, rows)
         arm = np.zeros(3) if centre is None else np.pad(centre, (0, 3 - len(centre)))
         return np.stack([translation - np.cross(rotation, arm), rotation])
 
     def _translation_and_rotation(self, column: Array, rows: list[int]) -> tuple[Array, Array, Array | None]:
-        """Return the translation (3,) and the rotation (3,) of a body, and the point on the axis of the latter, if any."""
+        """Return the translation (3,) and rotation (3,) of a body, and a point on its axis of rotation, see `_at_origin`."""
         translation, rotation = np.zeros((2, 3))
         labels = [self.labels[i] for i in rows]
         for i, label in zip(rows, labels, strict=True):
@@ -140,7 +143,7 @@ class FreeMotions:
         return translation, rotation, next((label.centre for label in labels if label.centre is not None), None)
 
     def _motion_of_body(self, column: Array, rows: list[int]) -> str:
-        """Return the name of the motion of a body: a rotation about a point or line if possible, else elementary motions."""
+        """Return the name of the motion of a body, see `_at_origin`: one rotation if possible, else elementary motions."""
         labels = [self.labels[i] for i in rows]
         translation, rotation, centre = self._translation_and_rotation(column, rows)
         square = rotation @ rotation
@@ -199,8 +202,9 @@ def _vector_text(values: Array) -> str:
 def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
     """Return the name of body `number` for messages, from the `body` (n_points,) of each point.
 
-    It is the name of a cell group that has exactly the nodes of the body; otherwise its centre, and the name of the smallest
-    group that contains it and not all bodies, such as that of a bolt with a cut, or its number.
+    This is the name of a cell group with exactly the nodes of the body. If there is no such group, it is the centre of the
+    body, preceded by the name of the smallest group that contains this body but not all bodies (for example both halves of
+    a cut bolt) or else by the number of the body.
     """
     members = np.flatnonzero(body == number)
     group, size = _group_of(mesh, members)

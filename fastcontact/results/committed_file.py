@@ -174,7 +174,7 @@ class CommittedFile(DriverFile):
         self._file.truncate(size)
 
     def _order(self, offset: int, data: bytes) -> tuple[int, int, int]:
-        """Return the sort key of a write, in the order in which the description of the module lists them."""
+        """Return the key that sorts writes in the order of the list in the docstring of the module."""
         if not self._overlaps(offset, offset + len(data)):
             return 0, 0, offset
         if offset == 0:

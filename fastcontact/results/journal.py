@@ -1,9 +1,9 @@
-"""Write-ahead journal at the end of a file, whose changes are executed again after a power loss (Mohan et al., 1992).
+"""Write-ahead journal at the end of a file, whose changes are applied again after a power loss (Mohan et al., 1992).
 
 After a power loss, any of the writes since the last synchronisation of the disk may be missing or incomplete. Incomplete new
 data are harmless, since no other data refer to them yet, but incomplete changes in place damage the file. These changes are
 therefore first written to a journal, together with checksums of the new data. The journal lies beyond the end of the HDF5
-contents, where HDF5 ignores it. The changes are executed when the journal and the new data are on the disk, and are executed
+contents, where HDF5 ignores it. The changes are applied when the journal and the new data are on the disk, and are applied
 again when the file is opened after a power loss.
 """
 
@@ -20,7 +20,7 @@ from fastcontact.errors import FileError
 Write = tuple[int, bytes]
 MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
-# Offset and length of a write, and whether its data are new. Of new data, only the checksum follows.
+# Offset and length of a write, and whether its data are new. For new data, only the checksum follows.
 HEADER = struct.Struct("<QQ?")
 DIGEST = hashlib.sha256().digest_size
 # Size of the pieces in which data are read for a checksum [bytes].
@@ -39,7 +39,7 @@ def pack(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
 
 
 def pending(file: IO[bytes]) -> list[Write]:
-    """Return the changes in the journal of a file, whose execution may have been interrupted.
+    """Return the changes in the journal of a file, which may not have been applied completely.
 
     The list is empty if there is no journal, or if the journal or the new data are incomplete. Raises FileError for a journal
     with a valid checksum but invalid lengths or offsets; these are checked before the new data are read. A journal is not

@@ -201,8 +201,8 @@ class ContactResult(NameSuggestions):
         Displacement of the secondary nodes in finite strain, where the contact forces act on the deformed body [length].
     middle : ndarray (dim,)
         Centre of the contact on the reference surface [length]. In axisymmetry it lies on the axis, unless the surface is
-        parallel to it or closes on itself, like that of an O-ring; otherwise it is the centre of pressure, moved onto the
-        planes of symmetry that the contact reaches. A plane of symmetry is assumed where supports
+        parallel to it or closes on itself, like that of an O-ring. In all other cases it is the centre of pressure, moved
+        onto the planes of symmetry that the contact reaches. A plane of symmetry is assumed where supports
         prescribe zero displacement at an end of the surface beyond which the other body does not extend.
     place : ndarray (m,)
         Position of each node relative to the `middle` [length]: the radius in axisymmetry; the signed arc length in 2D, and

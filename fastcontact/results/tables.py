@@ -366,12 +366,12 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     quantities = NODAL_QUANTITIES | {name: quantity for name, (_, quantity) in layout.CONTACT_FIELDS.items()}
     fields = [step.__dict__ | layout.contact_fields(mesh, step) for step in all_steps]
     for name, quantity in quantities.items():
-        if all(name in of_step for of_step in fields):
+        if all(name in step_fields for step_fields in fields):
             dims = ("point", *{1: (), 3: ("axis",), 6: ("stress_component",)}[layout.POINT_FIELDS[name]])
-            add(name, dims, quantity, [of_step[name] for of_step in fields])
+            add(name, dims, quantity, [step_fields[name] for step_fields in fields])
     contacts = [[step.contact.get(pair) for pair in pairs] for step in all_steps]
-    force = [[np.full(dim, np.nan) if c is None else c.force for c in of_step] for of_step in contacts]
-    pressure = [[np.nan if c is None else c.pressure_max for c in of_step] for of_step in contacts]
+    force = [[np.full(dim, np.nan) if c is None else c.force for c in step_contacts] for step_contacts in contacts]
+    pressure = [[np.nan if c is None else c.pressure_max for c in step_contacts] for step_contacts in contacts]
     add("contact_force", ("contact", "axis"), "force", force)
     add("contact_pressure_max", ("contact",), "pressure", pressure)
     coordinates = {

@@ -143,7 +143,8 @@ def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
 
     A chunk contains a small field at several steps, because the chunk index would otherwise be larger than the fields. Only
     chunks of a single step are compressed, because a compressed chunk moves in the file when data are added to it, and only
-    those of `layout.SPARSE_FIELDS`. Other fields would shrink by 30 %, in up to half of the time of writing a file.
+    those of `layout.SPARSE_FIELDS`. Other fields would shrink by 30 % only, and their compression
+    would take up to half of the writing time.
     """
     tail, rows = () if width == 1 else (width,), max(length, 1)
     steps = MAX_SHARED // (8 * rows * width)
@@ -312,6 +313,6 @@ def _write(table: Any, values: AnyArray, first: int) -> None:
     if values.size:
         rows = table.id.get_space()
         rows.select_hyperslab((first, *[0] * (values.ndim - 1)), values.shape)
-        # Without the type of the file, h5py would build the type in memory anew from the types of all columns.
+        # Without an explicit type, h5py would construct one from the types of all columns in each call.
         memory = np.ascontiguousarray(values, table.id.dtype), table.id.get_type()
         table.id.write(h5s.create_simple(values.shape), rows, *memory)

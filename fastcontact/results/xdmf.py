@@ -22,8 +22,8 @@ TAIL = "</Grid></Domain></Xdmf>\n"
 def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     """Write an XDMF file that refers to the steps of a result file, for ParaView before version 5.12.
 
-    The XDMF file contains no data; the result file must remain at its relative path. It refers to the steps that are complete
-    when it is written.
+    The XDMF file refers to the steps that are complete when it is written. It contains no data, so that the result file must
+    remain at its relative path.
 
     Parameters
     ----------

@@ -141,10 +141,10 @@ class AdaptiveStudy(Report):
         numbers = {name: getattr(self, name) for name in ("combination", "quantity", "tolerance", "reached")}
         errors = {name: list(map(finite_or_none, values)) for name, values in self._errors().items()}
         rounds = [
-            {"n_dofs": r.n_dofs, "n_cells": r.n_cells, **r.values, **dict(zip(errors, of_round)), "seconds": r.seconds}
-            for r, of_round in zip(self.rounds, zip(*errors.values(), strict=True), strict=True)
+            {"n_dofs": r.n_dofs, "n_cells": r.n_cells, **r.values, **dict(zip(errors, values)), "seconds": r.seconds}
+            for r, values in zip(self.rounds, zip(*errors.values(), strict=True), strict=True)
         ]
-        return self.framed({**numbers, "value": self.rounds[-1].values[self.quantity], "rounds": rounds})
+        return self.with_metadata({**numbers, "value": self.rounds[-1].values[self.quantity], "rounds": rounds})
 
     def table(self) -> AnyArray:
         """Return a structured array (n_rounds,) with a row for each mesh, as ``--csv`` writes it.
@@ -385,10 +385,10 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
 
     The error of a functional is bounded by the sum over all cells of the error of the solution times the error of the dual
     solution, which is the solution under a load that corresponds to the functional (Becker and Rannacher, 2001). For a
-    force the dual solution is proportional to the solution itself.
-    For a value at a point the dual stress decreases with the distance d like the stress of a point force, as d^(1 - dim)
-    with dim = 3 also in axisymmetry (Boussinesq, 1885; Flamant, 1892). Its error in a cell of size h decreases as h d^-dim,
-    and the norm of this error over the cell is the product with the square root of the volume.
+    force the dual solution is proportional to the solution itself. For a value at a point the dual stress decreases with
+    the distance d like the stress of a point force, as d^(1 - dim) with dim = 3 also in axisymmetry (Boussinesq, 1885;
+    Flamant, 1892). The error of the dual stress in a cell of size h decreases as h d^-dim; its norm over the cell is this
+    error times the square root of the volume.
     """
     position = _position(case, last, quantity, pair)
     if position is None:

@@ -34,7 +34,10 @@ def substitute(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, 
 
 
 def law_value(law: Any, value: Any, where: str) -> Any:
-    """Return the value of a law ``"a*value^p"``. Raises CaseError if the law is invalid or cannot be applied to `value`."""
+    """Return the value of a law ``"a*value^p"``.
+
+    Raises CaseError, with the location `where`, if the law is invalid or cannot be applied to `value`.
+    """
     match = _LAW.match(law) if isinstance(law, str) else None
     if match is None:
         raise CaseError(f"{where} = {law!r} must be 'value', 'a*value' or 'a*value^p' with numbers a and p")

@@ -77,7 +77,7 @@ def check_study(case: Case) -> None:
 
 
 def _check_finite(where: str, value: Any) -> None:
-    """Raise CaseError if a number in a table or a list is not finite."""
+    """Raise CaseError if a number in the table or list `value`, called `where` in the message, is not finite."""
     if isinstance(value, float) and not math.isfinite(value):
         raise CaseError(f"{where} = {value} must be finite")
     for key, entry in value.items() if isinstance(value, dict) else ():

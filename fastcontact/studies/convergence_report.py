@@ -239,9 +239,9 @@ def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
 def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
     """Return limit, order, theory and errors of a quantity, with None for missing numbers."""
     limit, split, reference = series.limits.get(name), series.split(name), series.reference.get(name)
-    own_names = {key: key for key in ("uncertainty", "order", "order_uncertainty", "converging")}
+    same_names = {key: key for key in ("uncertainty", "order", "order_uncertainty", "converging")}
     entry: dict[str, Any] = {
-        **_fields(limit, limit="value", **own_names),
+        **_fields(limit, limit="value", **same_names),
         "converges_to_theory": series.converges_to_theory(name),
         "theory": series.theory.get(name),
         **_fields(
@@ -425,7 +425,7 @@ class Study(Report):
         """
         combinations = [series_dict(series) for series in self.series]
         numbers = {"confidence": CONFIDENCE, **series_dict(self.best), "combinations": combinations}
-        return self.framed({**numbers, "failed_combinations": dict(self.failed)})
+        return self.with_metadata({**numbers, "failed_combinations": dict(self.failed)})
 
     def table(self) -> AnyArray:
         """Return a structured array (n_rows,) with a row for each level of each combination, as ``--csv`` writes it.

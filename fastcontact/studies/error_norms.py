@@ -176,7 +176,7 @@ def error_against(
 def _cell_arrays(
     model: Model, name: str, rows: Indices | slice, displacement: Array, n_points: int | None, offset: StressOffset | None
 ) -> CellArrays:  # fmt: skip
-    """Return shape functions, stresses, volumes and compliances at the quadrature points of cells of one element type.
+    """Return shape functions, stresses, volumes and compliances at the quadrature points of the cells `rows` of type `name`.
 
     The shape functions are (n_q, n_nodes) [-], the stresses (n_cells, n_q, n_components) [pressure], and the volumes of the
     quadrature points (n_cells, n_q) [length^dim], in axisymmetry [length^3]. The compliances are (n_cells, n_q, n_components,
@@ -197,7 +197,11 @@ def _cell_arrays(
 
 
 def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, cell_arrays: CellArrays) -> Array:
-    """Return the squares (4,) of the norms over some cells, in the order of the attributes of `ErrorNorms`."""
+    """Return the squares (4,) of the norms over `cells` (n_cells, n_nodes), in the order of the attributes of `ErrorNorms`.
+
+    `points` and `u` (n_points, dim) are the nodal positions and displacements [length]; for `cell_arrays` see
+    `_cell_arrays`.
+    """
     N, stress, volume, compliance = cell_arrays
     exact_u, exact_stress = _exact_fields(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
@@ -293,8 +297,8 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     True
     """
     model.refuse_nonlinear("error estimates are")
-    heat_factors, initial_factors = (step.iterations.get(f"{kind}_factors", ()) for kind in ("temperature", "initial"))
-    offset = model.stress_offset(heat_factors, initial_factors, temperature=step.temperature)
+    factors = [step.iterations.get(f"{kind}_factors", ()) for kind in ("temperature", "initial")]
+    offset = model.stress_offset(factors[0], factors[1], temperature=step.temperature)
     field = model.material_field()
     in_cells = CellStress(model.mesh, model.kinematics, field.moduli, step.displacement, field.treatment, offset)
     smooth = smoothed_stress(model.mesh, field, in_cells)
@@ -314,8 +318,8 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:
     """Add h / E times the integral of the squared traction jump over each secondary facet to `contact` (n_solids,).
 
-    The jump is the difference between the pressure and the negative smoothed normal stress, h is the size of the facet, and
-    E is Young's modulus of its cell.
+    The jump is the difference between the pressure and the negative normal component of the smoothed stress `smooth`, h is
+    the size of the facet, and E is Young's modulus of its cell.
     """
     mesh, outer, cells_of_outer = model.mesh, outer_facets(model.mesh), cells_of_outer_facets(model.mesh)
     pair = next(pair for pair in model.contact if pair.name == result.name)

@@ -72,7 +72,7 @@ class Progress:
     seconds : float
         Wall time [s] of the run; 0 if its result is from the store.
     error : str
-        Reason of the failure of the run; empty if it succeeded.
+        Reason for the failure of the run; empty if it succeeded.
     stored : bool
         Whether the result is from the store.
     """
@@ -88,7 +88,7 @@ class Progress:
 
 def run_study(
     runs: Sequence[Run],
-    name: str,
+    failure: str,
     *,
     executor: Executor | None = None,
     workers: int | None = None,
@@ -100,7 +100,7 @@ def run_study(
 
     Raises CaseError if the number of workers is invalid or if the function that computes a quantity fails before any run has
     succeeded, and FastcontactError if no worker process can start. If all runs fail, the error of the first one is raised,
-    with `name` before its message.
+    with `failure`, such as "no level could be solved", before its message.
     """
     storage = None if store is None else Store(store)
     stored = {i: result for i, run in enumerate(runs) if storage and (result := storage.get(run)) is not None}
@@ -121,7 +121,7 @@ def run_study(
                 on_progress(state)
     if all("error" in result for result in results.values()):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
-        raise kind(f"{name}; {runs[0].label}: {results[0]['error']}")
+        raise kind(f"{failure}; {runs[0].label}: {results[0]['error']}")
     return [results[index] for index in range(len(runs))]
 
 
@@ -219,7 +219,7 @@ class RecordingContext(SpawnContext):
 
 
 class Workers(ProcessPoolExecutor):
-    """A process pool whose workers can be terminated while they work. They end when this process ends."""
+    """A process pool whose workers can be terminated while they work, and end when the calling process ends."""
 
     def __init__(self, count: int) -> None:
         self.context = RecordingContext()

@@ -6,11 +6,11 @@ The model of the values on meshes of size :math:`h_i` is
 
 with the limit L, the order p, a constant C and independent standard normal variables :math:`e_i`, so that s is the relative
 scatter of the mesh error. For each order p the parameters L, C and s are integrated out (Bayesian linear regression with
-weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and the results are averaged with the evidence of the orders. The prior of
-p is log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of few meshes does not
-make the error bar too small. The first k meshes may be too coarse for a single power of h. The prior probability of k is
-proportional to (1/2)^k, and at least three meshes are not too coarse. The error bar is the distance from the median of L to
-the farther end of its 95 % interval. The reasons for these choices are given in docs/theory/convergence.md.
+weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and the results for all orders are averaged, weighted by their evidence.
+The prior of p is log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of few
+meshes does not make the error bar too small. The first k meshes may be too coarse for a single power of h. The prior
+probability of k is proportional to (1/2)^k, and at least three meshes are not too coarse. The error bar is the distance from
+the median of L to the farther end of its 95 % interval. The reasons for these choices are in docs/theory/convergence.md.
 """
 
 from __future__ import annotations
@@ -171,7 +171,10 @@ def _limit_distributions(x: Array, y: Array, floor: float, coarse: int) -> Array
 
 
 def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[float]:
-    """Return lower bound, median and upper bound of the central 95 % interval of a mixture of Student distributions."""
+    """Return lower bound, median and upper bound of the central 95 % interval of a mixture of Student distributions.
+
+    Each distribution has a `centre`, a `width` and a `weight` (n,), and `dof` degrees of freedom.
+    """
     from scipy.optimize import brentq
     from scipy.special import stdtr
 

@@ -165,8 +165,8 @@ def _measured_value(name: str, measure: Measure, steps: Sequence[StepResult]) ->
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         raise QuantityError(
-            f"the quantity '{name}' is a function that failed ({reason}): it must return a number of the last StepResult, "
-            f"or of the list of all if its argument is called '{STEPS_ARGUMENT}'"
+            f"the quantity '{name}' is a function that failed ({reason}): it must return a number for the last "
+            f"StepResult, or for the list of all steps if its argument is called '{STEPS_ARGUMENT}'"
         ) from error
 
 

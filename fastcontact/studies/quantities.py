@@ -40,7 +40,7 @@ RATIOS = tuple(name for name, (_, kind) in LABELS.items() if not kind)
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
-    """Return the quantities of interest of a solved case, in its units, with those of the contact pair if it is given."""
+    """Return the quantities of interest of a solved case and, unless `pair` is None, of this contact pair."""
     quantities = {} if pair is None else _contact_quantities(case, last.contact[pair], pair)
     quantities["von_mises_max"], position = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
@@ -64,7 +64,7 @@ def check_names(case: Case, names: Iterable[str]) -> None:
 def _probe_and_pair_names(case: Case) -> list[str]:
     """Return the names of the quantities of the probes and contact pairs of a case, such as ``"fit.moment.z"``.
 
-    Checks use the same names. Quantities that require an option are omitted for pairs without this option.
+    The checks of a case file use the same names. Quantities that require an option are omitted for pairs without this option.
     """
     kinematics = case.model.kinematics
     probe_kinds = [kind for kind in defined_names(checks.PROBE_QUANTITIES, kinematics) if kind != "shear"]
@@ -241,8 +241,8 @@ def node_spacings(
     """Return half the distance between neighbouring nodes [length] for each quantity that is only known at nodes.
 
     These quantities are the midpoints of bounds that are positions of nodes, and the depth of a largest stress that is not
-    interpolated. `values` are the quantities of the pair and of the mesh, if it is known. The positions of nodes in nested
-    meshes may agree by chance, which does not mean that they have converged.
+    interpolated. `values` are the quantities of interest, and `mesh` is None if it is unknown. On nested meshes, such
+    quantities may agree by chance before they have converged.
     """
     bounds = {f"{name}.{kind}": getattr(contact, kind) for name, contact in last.contact.items() for kind in BRACKETS}
     if pair is not None:
@@ -255,7 +255,10 @@ def node_spacings(
 
 
 def _neighbour_distance(mesh: Mesh, node: int) -> float:
-    """Return the largest distance [length] between nodes along the edges at a corner, or along all edges at other nodes."""
+    """Return the largest distance [length] between neighbouring nodes on the edges at a corner node of a cell.
+
+    For other nodes, all edges of their cells are considered.
+    """
     distance = 0.0
     for name, block in mesh.solids.items():
         element = elements.get(name)

@@ -311,7 +311,7 @@ class Report:
         captions = ((f"{self.title}: {caption}".strip(": "), rows) for caption, rows in self.tables())
         return "".join(html_table(rows[1:], rows[0], caption) for caption, rows in captions)
 
-    def framed(self, numbers: dict[str, Any]) -> dict[str, Any]:
+    def with_metadata(self, numbers: dict[str, Any]) -> dict[str, Any]:
         """Return the numbers of a study, the name of its case and the versions of the software, as ``--json`` writes them."""
         case = {"case": self.name, "title": self.title, "units": dict(self.units)}
         return {**case, **numbers, "versions": versions()}

@@ -479,12 +479,12 @@ def refuse_case_options(options: Mapping[str, Any]) -> None:
 
 
 def run_functions(
-    runs: Sequence[FunctionRun], name: str, *, executor: Executor | None, workers: int | None, **options: Any
+    runs: Sequence[FunctionRun], failure: str, *, executor: Executor | None, workers: int | None, **options: Any
 ) -> list[dict[str, Any]]:
     """Return the results of `run_study`; by default the runs are executed one after the other in this process."""
     if (executor is not None or (workers or 1) > 1) and not isinstance(executor, ThreadPoolExecutor):
         _check_picklable(runs[0])
-    return run_study(runs, name, executor=executor, workers=workers or 1, **options)
+    return run_study(runs, failure, executor=executor, workers=workers or 1, **options)
 
 
 def _check_picklable(run: FunctionRun) -> None:

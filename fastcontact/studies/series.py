@@ -133,7 +133,7 @@ class Series:
     levels : list of Level
         Results of the meshes on which the case could be solved, the coarsest first.
     failed : dict of int to str
-        Reason of the failure on each other mesh, by the number of its level.
+        Reason for the failure on each other mesh, by the number of its level.
     theory : dict of str to float
         Values of the theory at equal approach, by quantity.
     reference : dict of str to float
@@ -215,8 +215,8 @@ class Series:
     def has_model_error(self, quantity: str) -> bool:
         """Return whether the model error at equal approach is known.
 
-        The theory is exact, or the values converge and either change monotonically on successive meshes or have a range
-        smaller than the model error. Otherwise they do not support an extrapolation.
+        This is the case if the theory is exact, or if the values converge and either change monotonically on successive
+        meshes or have a range smaller than the model error. Other values do not support an extrapolation.
         """
         split, values = self.split(quantity), np.array(self.values(quantity))
         if split is None or not (self.exact_theory or self.limits[quantity].converging):

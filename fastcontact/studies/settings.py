@@ -166,10 +166,10 @@ def combinations(
         selected = [name for name in ALL_ELEMENTS if can_mesh(settings, name)]
     if formulations is not None and settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    compared = [settings.case_combination.formulation] if formulations is None else list(formulations)
-    if compared == ["all"]:
-        compared = list(FORMULATIONS)
-    return tuple(_make_combination(element, formulation) for element in selected for formulation in compared)
+    formulation_names = [settings.case_combination.formulation] if formulations is None else list(formulations)
+    if formulation_names == ["all"]:
+        formulation_names = list(FORMULATIONS)
+    return tuple(_make_combination(element, formulation) for element in selected for formulation in formulation_names)
 
 
 def matching_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
@@ -287,7 +287,7 @@ def _no_mesh_message(settings: Settings, element: str) -> str:
         return f"there are no meshes of {element} in this study: give the arguments of level 0 in [study.{shape}]"
     return (
         f"meshes of {element} cannot be made from the case's {original}: give a generator and its arguments of level 0 in "
-        "[study], or choose an element on the same corners"
+        "[study], or choose an element with the same corners"
     )
 
 

@@ -196,7 +196,7 @@ class Sweep(Report):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the sweep as numbers, strings, lists and dictionaries, as ``--json`` writes it; differences are relative."""
-        return self.framed({
+        return self.with_metadata({
             "combination": self.combination,
             "parameters": {name: list(values) for name, values in self.parameters.items()},
             "points": [_point_dict(point) for point in self.points],
@@ -246,7 +246,7 @@ class Sweep(Report):
         remarks += [f"{label_of(choice)} failed: {text}" for choice, text in self.failed]
         theories = [{point.theory.get(name) for point in self.points} - {None} for name in self._main_quantities()]
         values = [[point.values.get(name, math.nan) for point in self.points] for name in self._main_quantities()]
-        differ = [np.ptp(computed) > NOTABLE * np.max(np.abs(computed)) for computed in values]  # not so, given forces
+        differ = [np.ptp(computed) > NOTABLE * np.max(np.abs(computed)) for computed in values]  # not prescribed forces
         if any(len(theory) == 1 and varies for theory, varies in zip(theories, differ, strict=True)):
             remarks += [
                 "the theory is the same for all points: a parameter in [study.parameters] can change keys of the theory, too"

@@ -405,7 +405,7 @@ CONTACT = [
     Mistake("tied contact with a penalty", lambda: pair_of("CONT_UPPER", "CONT_LOWER", kind="tied", penalty=1.0), fc.ContactError,
             r"contact 'pair' is tied, which keeps the initial gaps exactly: leave out 'penalty'"),
     Mistake("a penalty of zero", lambda: pair_of("CONT_UPPER", "CONT_LOWER", penalty=0.0), fc.ContactError,
-            r"penalty = 0\.0 of contact 'pair' must be positive; leave it out for no penetration"),
+            r"penalty = 0\.0 of contact 'pair' must be positive; without it, there is no penetration"),
     Mistake("all nodes excluded", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded="CONT_UPPER"), fc.ContactError,
             r"contact 'pair' excludes all nodes of 'CONT_UPPER': no node remains for contact"),
     Mistake("bodies pulled apart by a force", lambda: solved(lifted()), fc.ConvergenceError,

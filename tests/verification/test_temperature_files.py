@@ -205,7 +205,8 @@ def test_fields_in_case_files(folder):
     np.testing.assert_array_equal(own[0].value, field_of(fc.read_mesh(folder / "block.med"), 2.0))
     model = case(folder, "file = 'heat.med'\nfield = 'TEMP'\ntimes = [0.0, 1.0]")
     assert (
-        "Temperature: a number for each point over 0 in all solid cells, at 2 instants from 0 to 1." in model.describe()
+        "Temperature: a number for each point (reference: 0) in all solid cells, at 2 instants from 0 to 1"
+        in model.describe()
     )
     assert len(case(folder, "file = ['heat.vtu', 'heat.vtu']\nfield = 'TEMP'\ntimes = [0, 1]").temperatures) == 2
     assert fingerprint(model)["the temperatures"] != fingerprint(case(folder, "value = 1.0"))["the temperatures"]

@@ -245,7 +245,7 @@ def test_one_vector_turns_all_forces(formulation, options):
     ({"normals": (0.0, 1.0, 0.0)}, "a vector of 2 numbers"),
     ({"opposite": "edge"}, "lies opposite to 'edge'"),
     ({"slip": "none"}, "unknown kind of slip 'none'"),
-    ({"search_distance": 0.0}, "search_distance = 0.0 of contact 'pair' must be positive; leave it out for any distance"),
+    ({"search_distance": 0.0}, "must be positive; without it, the distance is unlimited"),
     ({"kind": "gap_only", "penalty": 1.0}, "gap_only, which has no forces"),
     ({"kind": "gap_only", "friction": 1.0}, "gap_only, which excludes friction"),
     ({"tangential_penalty": 1.0}, "no friction that it could soften"),

@@ -104,11 +104,11 @@ class Assembly:
                 points = tuple(index.get(node, -1) for node in cell.nodes)
                 if -1 in points:
                     raise cell.error(f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined")
-                kind = element_type(cell.type)
-                row = -1 if kind is None else counts.setdefault(kind.element, 0)
-                if kind is not None:
-                    counts[kind.element] += 1
-                elements[number] = Element(scope, number, cell, kind, points, row)
+                solid_type = element_type(cell.type)
+                row = -1 if solid_type is None else counts.setdefault(solid_type.element, 0)
+                if solid_type is not None:
+                    counts[solid_type.element] += 1
+                elements[number] = Element(scope, number, cell, solid_type, points, row)
         self.points = np.concatenate(coordinates) if len(coordinates) > 1 else coordinates[0]
 
     @cached_property
@@ -154,7 +154,7 @@ class Assembly:
         return "", text
 
     def members(self, kind: str, name: str, location: Location) -> list[Any]:
-        """Return the points or the elements, by `kind`, of a set or a number. Raises CaseError if it is not defined."""
+        """Return the points or elements (`kind` "node" or "element") of a set or a number; CaseError if it is undefined."""
         scope, label = self.split_name(name)
         if label.isdecimal():
             return [self._item(kind, scope, int(label[:19]), location)]
@@ -387,7 +387,7 @@ ELEMENT_LOADS = {"DLOAD": {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}, 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Keyword, location, kind and target of a distributed load, which is a face or some elements.
+    """Target of a distributed load, a face or elements, with the keyword, the location and the kind of the load.
 
     `numbers` contains the direction [-] of gravity, two vectors for the axis of rotation of centrifugal forces (origin
     [length] and direction [-]), or the film coefficient [power / (area temperature)].

@@ -225,7 +225,7 @@ class Conditions:
         return None
 
     def _local_component(self, point: int, number: int) -> tuple[Component, float]:
-        """Return the component along a local axis and 1.0, or the parallel global component and the sign of the axis."""
+        """Return the component along local axis `number` and 1.0, or the parallel global component and its sign."""
         direction = self.directions[point][number]
         axis = int(np.argmax(np.abs(direction)))
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:

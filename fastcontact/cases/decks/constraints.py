@@ -60,10 +60,10 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
 
 
 def _equations(deck_mesh: DeckMesh, block: Block, axes: Mapping[int, Array]) -> Iterator[list[Term]]:
-    """Yield the terms of each equation of *EQUATION, whose lines state their number and then node, component and coefficient.
+    """Yield the terms of each equation of *EQUATION: the number of terms, then node, component and coefficient of each.
 
-    The components are along the local `axes` of points, those of the terms along the global axes. Raises CaseError if the
-    number of terms is wrong, or if all coefficients are zero.
+    Components in the deck are along the local `axes` of points, those of the returned terms along the global axes.
+    Raises CaseError if the number of terms is wrong, or if all coefficients are zero.
     """
     rows = block.iter_rows()
     for first in rows:
@@ -83,7 +83,7 @@ def _equations(deck_mesh: DeckMesh, block: Block, axes: Mapping[int, Array]) -> 
 
 
 def _equation_terms(deck_mesh: DeckMesh, row: Row, start: int, axes: Mapping[int, Array]) -> Iterator[Term]:
-    """Yield the terms along the global axes of the term in the entries `start` to `start` + 2 of a line."""
+    """Yield terms along the global axes that are equivalent to that in the entries `start` to `start` + 2 of a line."""
     point, component = deck_mesh.node(row.text(start), row.location), row.integer(start + 1)
     if not 1 <= component <= deck_mesh.dim:
         raise row.error(f"component {component} of '{row.text(start)}' is not within 1 to {deck_mesh.dim}")

@@ -31,7 +31,7 @@ class Cell(Located):
 class Members(Item):
     """Entries of a set: node or element numbers, or the name of another set.
 
-    Both belong to `instance` or, if this is empty, to the instance in which the set is defined.
+    The members belong to `instance` or, if this is empty, to the instance in which the set is defined.
     """
 
     numbers: Sequence[int] = ()

@@ -40,16 +40,16 @@ def nodes(content: Content, part: Part, block: Block) -> None:
 def cells(content: Content, part: Part, block: Block) -> None:
     """Read *ELEMENT: the numbers and the nodes of elements of one type."""
     name, element_set = block.required("TYPE").upper(), block.get("ELSET")
-    kind = element_type(name)
-    if kind is None and name not in DISCRETE:
+    solid_type = element_type(name)
+    if solid_type is None and name not in DISCRETE:
         where = f" in set '{element_set}'" if element_set else ""
         count = sum(1 for _ in _element_rows(block, 0))
         raise block.error(
             f"element type {name[:40]}{unsupported_kind(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
         )
-    n_nodes = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
-    if kind is not None and kind.note and f"{name}: " not in "".join(content.notes):
-        content.note(block, f"{name}: {kind.note}")
+    n_nodes = DISCRETE[name] if solid_type is None else elements.get(solid_type.element).n_nodes
+    if solid_type is not None and solid_type.note and f"{name}: " not in "".join(content.notes):
+        content.note(block, f"{name}: {solid_type.note}")
     members = array("q")
     for row in _element_rows(block, n_nodes):
         number = row.integer(0)

@@ -54,7 +54,7 @@ class Track:
 
     `numbers` alternates between load factors and values, since each node may have a separate track and a list of pairs would
     take three times the memory. `periods` are those in which the quantities act. `value_in_total_time` is the current value
-    with its amplitude, if that is in total time.
+    with its amplitude, if the amplitude is in total time.
     """
 
     numbers: array[float]

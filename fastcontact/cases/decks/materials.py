@@ -179,7 +179,7 @@ def coefficients_of(current: Material, block: Block) -> float | tuple[float, ...
 
 
 def law_of(content: Content, material: Material, axes: Any, incompatible_modes: bool) -> Any:
-    """Return the model's material with the given `axes`; `incompatible_modes` states whether its elements have them."""
+    """Return the material of the model with the given `axes` and, if `incompatible_modes` is true, these modes."""
     if content.heat == "uncoupled":
         return _add_constants(material, ARBITRARY_LAW, axes, conductivity=_conductivity(content, material))
     assert material.law is not None

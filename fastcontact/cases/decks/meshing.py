@@ -176,5 +176,5 @@ def check_nodes(deck_mesh: DeckMesh, name: str, location: Location) -> None:
 
 
 def group_of_surface(deck_mesh: DeckMesh, name: str) -> str:
-    """Return the name of the group of a surface, whose case is ignored."""
+    """Return the name of the group of a surface, whose name may be in upper or lower case."""
     return next(group for group in deck_mesh.groups if key_of(group) == key_of(name))

@@ -304,7 +304,10 @@ class ModelBase(NameSuggestions):
         return {name: moduli[rows] for name, rows in self.material_of_cells().items()}
 
     def _check_material(self, index: int, group: str | None, numbers: Numbers) -> None:
-        """Raise ModelError if cells already have a different material, unless that one was assigned to all cells."""
+        """Raise ModelError if cells already have another material than number `index`, unless that was assigned to all cells.
+
+        `numbers` contains the numbers of the present materials of the cells, -1 for none, and `group` names the cells.
+        """
         new_material = self.materials[index][0]
         for number in np.unique(numbers[numbers >= 0]):
             old_material, groups = self.materials[number]

@@ -219,11 +219,10 @@ class ModelContact(ModelConnections):
         """Apply a fluid pressure to both sides of a contact pair, wherever the fluid can penetrate from a source.
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where the contact
-        pressure does not exceed the fluid pressure. There it acts on each side along the normals of this side and over
-        its own area; on the primary side this is the part that faces the wetted part of the secondary side. At finite
-        strain, normals and areas are those of the deformed surfaces. The pressure at each secondary node is the attribute
-        ``fluid_pressure`` of the contact result. To apply the pressure of the fluid to other surfaces, use
-        `add_pressure`.
+        pressure does not exceed the fluid pressure. There the fluid pressure acts on both sides, along the
+        normals of each side; on the primary side, it acts on the area that faces the wetted part of the secondary side. At
+        finite strain, normals and areas are those of the deformed surfaces. The pressure at each secondary node is the
+        attribute ``fluid_pressure`` of the contact result. To apply the fluid pressure to other surfaces, use `add_pressure`.
 
         Parameters
         ----------
@@ -418,8 +417,8 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         variant = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        no_options = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
-        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(variant) if f.init and f.name not in no_options)]
+        internal = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held_motions")
+        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(variant) if f.init and f.name not in internal)]
         known += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, known, ContactError)

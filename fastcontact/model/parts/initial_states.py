@@ -263,8 +263,8 @@ class ModelInitialStates(ModelLoads):
 
         Return None if there are no such stresses. `temperature_factors` and `initial_factors` are the multipliers of the
         temperatures and of the initial states, which `StepResult.iterations` contains under these names. With heat
-        conduction, `temperature` (n_points,) [temperature] is the nodal temperature of the step. `field` avoids a second
-        computation of `material_field`.
+        conduction, `temperature` (n_points,) [temperature] is the nodal temperature of the step. `field` is the
+        result of `material_field`, if it has been computed already.
         """
         rise, states = self.expanding_rise(temperature_factors, temperature), []
         if len(initial_factors):
@@ -308,7 +308,7 @@ class ModelInitialStates(ModelLoads):
         return sums_by_ramp((ramp, self._forces_of(field, offset)) for ramp, offset in offsets)
 
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
-        """Return the nodal forces (n_points, dim) [force] equivalent to a stress offset: minus the internal forces of it."""
+        """Return the nodal forces (n_points, dim) [force] equivalent to a stress offset: minus its internal forces."""
         u, treatment = np.zeros(self.mesh.points.shape), field.treatment
         stress = stress_at_points(self.mesh, self.kinematics, field.moduli, field.moduli_rows, u, treatment, offset)
         return -internal_force(self.mesh, self.kinematics, stress)

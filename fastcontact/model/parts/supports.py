@@ -257,7 +257,7 @@ class ModelSupports(ModelContact):
 
 
 def _checked_value(name: str, value: Any, table: Table | None, rotates: bool = False) -> tuple[Any, Table | None]:
-    """Return a displacement and its history after checks: a number, a function, or a tuple of (load factor, displacement)."""
+    """Return a displacement (a number, a function or pairs (load factor, displacement)) and its history after checks."""
     if isinstance(value, Iterable):
         if table is not None or rotates:
             raise ModelError(f"{name} is given at several load factors: leave out ramp and rotation")

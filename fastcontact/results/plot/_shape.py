@@ -101,7 +101,7 @@ def deformed_shape(
         Described for `pressure_profile`.
     view : (float, float), optional
         Elevation and azimuth of the view of a 3D mesh [degrees]. By default it is (25, -60) or, if the marked value is not
-        visible from there, the first of eight views from corners of the bounding box from which it is.
+        visible from there, the first of eight views, from corners of the bounding box, that shows it.
     ax : matplotlib Axes, optional
         Axes of the plot, which in 3D must have ``projection="3d"``; by default those of a new figure.
 
@@ -260,9 +260,9 @@ def section(
     corners = displaced_points(triangles[..., :3], scale, triangles[..., 3:6])
     offset = 0.0 if labels else origin @ basis.T
     flat, values = corners @ basis.T - offset, triangles[..., 6]
-    best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    marked = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     points = flat.reshape(-1, 2)
-    points = points if zoom is None else np.array(_axes.zoom_window(flat[best], zoom, points))
+    points = points if zoom is None else np.array(_axes.zoom_window(flat[marked], zoom, points))
     axes = new_axes(ax, _axes.figure_size(points))
     limits = plot_field.range if plot_field.signed else (float(values.min()), float(values.max()))
     corner_rows = np.arange(values.size).reshape(-1, 3)
@@ -270,10 +270,10 @@ def section(
     strokes = displaced_points(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - offset
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
         axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
-    undeformed = triangles[best][:3] - ((triangles[best][:3] - origin) @ direction) * direction
+    undeformed = triangles[marked][:3] - ((triangles[marked][:3] - origin) @ direction) * direction
     size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    extreme = plot_field.extreme_label(values[best], units, " on the section")
-    _axes.mark(axes, flat[best], f"{extreme}\nundeformed at {position_text(undeformed, size)}")
+    extreme = plot_field.extreme_label(values[marked], units, " on the section")
+    _axes.mark(axes, flat[marked], f"{extreme}\nundeformed at {position_text(undeformed, size)}")
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     through = position_text(origin, float(np.ptp(mesh.points, axis=0).max()))
@@ -318,19 +318,20 @@ def _intersection(plot_field: Field, step: StepResult, origin: Array, direction:
 
 
 def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
-    """Return the intersection of the cells with the plane, where the heights (n_points,) of the points are zero.
+    """Return the intersection of cells with the plane of zero `height` (n_points,), see `_intersection`.
 
-    Each cell is divided into tetrahedra between its centre and triangles of its facets.
+    `data` (n_points, 7) are the positions, displacements and values at the points. Each cell is divided into tetrahedra
+    between its centre and triangles of its facets.
     """
     pieces, strokes = [np.empty((0, 3, 7))], [np.empty((0, 2, 7))]
     for name, block in mesh.solids.items():
-        kind = elements.get(name)
+        element = elements.get(name)
         cells = block[(height[block].min(axis=1) < 0.0) & (height[block].max(axis=1) >= 0.0)]
         if not len(cells):
             continue
-        N = kind.shape(kind.nodes[: kind.n_corners].mean(axis=0)[None])[0]
+        N = element.shape(element.nodes[: element.n_corners].mean(axis=0)[None])[0]
         centre, centre_height = np.einsum("n,end->ed", N, data[cells]), height[cells] @ N
-        for facet in kind.facets:
+        for facet in element.facets:
             for triangle in np.array(facet)[flat_triangles(len(facet))]:
                 corners = cells[:, triangle]
                 corner_data = np.concatenate([data[corners], centre[:, None]], axis=1)

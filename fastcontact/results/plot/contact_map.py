@@ -128,7 +128,7 @@ def _panels(axes: Sequence[Any] | None, two_maps: bool) -> list[Any]:
     if axes is not None:
         panels = list(np.atleast_1d(np.array(axes, dtype=object)))
         if len(panels) < 1 + two_maps:
-            raise FastcontactError(f"a contact with shear needs two axes, but {len(panels)} are given")
+            raise FastcontactError(f"the maps of two quantities need two axes, but {len(panels)} are given")
         return panels[: 1 + two_maps]
     panels = list(new_panels(1, 1 + two_maps, (9.6 if two_maps else 5.6, 4.6))[0])
     panels[0].figure.set_layout_engine("compressed")  # places the colour bar next to a narrow map

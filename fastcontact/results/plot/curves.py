@@ -139,9 +139,9 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
-    """Return the limits of the x axis, which exceed the extents of the contact and of the theories by about one third.
+    """Return the limits of the x axis, about one third beyond the contact and the radii of the theories.
 
-    The limits exceed the farthest node and the radii of the theories by at most 2 %. They include both sides of the middle if
+    The limits lie at most 2 % beyond the farthest node or the largest radius. They include both sides of the middle if
     the surface has nodes on both sides.
     """
     closed = np.abs(contact.place[contact.active]).max(initial=0.0)

@@ -47,9 +47,9 @@ def fill(
     for name, cells in blocks.items():
         shape, pieces = np.eye(cells.shape[1]), flat_triangles(cells.shape[1])
         if subdivided and name != "tri3":
-            kind = elements.get(name)
-            xi, pieces = lattice(kind.n_corners == 3, CUTS)
-            shape = kind.shape(xi if kind.n_corners == 3 else 2.0 * xi - 1.0)
+            element = elements.get(name)
+            xi, pieces = lattice(element.n_corners == 3, CUTS)
+            shape = element.shape(xi if element.n_corners == 3 else 2.0 * xi - 1.0)
         positions.append(np.einsum("ps,nsd->npd", shape, points[cells]).reshape(-1, 2))
         interpolated.append((values[cells] @ shape.T).ravel())
         triangles.append((start + len(shape) * np.arange(len(cells))[:, None, None] + pieces).reshape(-1, 3))
@@ -68,13 +68,13 @@ def fill_triangles(
     return ax.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=limits[0], vmax=limits[1])
 
 
-def outlines(name: str, corners: Array) -> Array:
-    """Return the outlines (n, m, 2) of cells (n, n_nodes, 2) as polygons, in which curved sides are subdivided [length]."""
-    kind = elements.get(name)
-    if kind.order == 1:
-        return corners[:, : kind.n_corners]
+def outlines(name: str, nodes: Array) -> Array:
+    """Return the outlines (n, m, 2) of cells with `nodes` (n, n_nodes, 2) as polygons; curved sides are divided [length]."""
+    element = elements.get(name)
+    if element.order == 1:
+        return nodes[:, : element.n_corners]
     line = elements.get("line3").shape(np.linspace(-1.0, 1.0, CUTS, endpoint=False)[:, None])
-    return np.concatenate([np.einsum("ps,nsd->npd", line, corners[:, list(side)]) for side in kind.facets], axis=1)
+    return np.concatenate([np.einsum("ps,nsd->npd", line, nodes[:, list(side)]) for side in element.facets], axis=1)
 
 
 def lattice(triangle: bool, n: int) -> tuple[Array, AnyArray]:

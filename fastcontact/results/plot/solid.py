@@ -189,9 +189,9 @@ def shows_extreme(plot_field: Field, points: Array, view: tuple[float, float]) -
     return not bool(screen.hidden(points[[plot_field.extreme]])[0])
 
 
-def view_of_extreme(plot_field: Field, position: Array) -> tuple[float, float]:
+def view_of_extreme(plot_field: Field, points: Array) -> tuple[float, float]:
     """Return the first of VIEWS from which the extreme value of a field is visible, or the first one if there is none."""
-    return next((view for view in VIEWS if shows_extreme(plot_field, position, view)), VIEWS[0])
+    return next((view for view in VIEWS if shows_extreme(plot_field, points, view)), VIEWS[0])
 
 
 def viewer_direction(view: tuple[float, float]) -> Array:
@@ -250,11 +250,11 @@ def _subdivision(n: int) -> Array:
     return np.column_stack([1.0 - points.sum(axis=1), points])[pieces]
 
 
-def _outline(name: str, corners: Array) -> Array:
-    """Return the sides of facets as strokes (n, 2, 3) [length] between neighbouring nodes."""
+def _outline(name: str, nodes: Array) -> Array:
+    """Return the sides of facets with `nodes` (m, n_nodes, 3) as strokes (n, 2, 3) between neighbouring nodes [length]."""
     element = elements.get(name)
     ends = list(element.edges)
     if element.order == 2:
         middles = range(element.n_corners, element.n_corners + len(ends))
         ends = [side for (a, b), middle in zip(ends, middles) for side in ((a, middle), (middle, b))]
-    return np.asarray(corners[:, np.array(ends)].reshape(-1, 2, 3))
+    return np.asarray(nodes[:, np.array(ends)].reshape(-1, 2, 3))

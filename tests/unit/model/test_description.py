@@ -106,8 +106,8 @@ def test_every_material_load_and_connection_is_told():
     model.add_hydrostatic_pressure("LEFT", weight=1.0, level=2.0)
     lines = model.describe()
     for text in (
-        "Temperature: 5 over 1 in all solid cells.",
-        "Temperature: a number for each point over 0 in 'BLOCK', with a separate history.",
+        "Temperature: 5 (reference: 1) in all solid cells.",
+        "Temperature: a number for each point (reference: 0) in 'BLOCK', with a separate history.",
         "gravity",
         "Load: the centrifugal force",
         "Load: the moment on 'REF': z = 1.5.",
