@@ -208,7 +208,7 @@ def _contact_at_end(
         if pair.options.kind == "bilateral_once_closed":
             # Points that have slid beyond the other side are included, since they may return to it.
             never_opening[name] = constraints.positions, solution.active | constraints.equality
-        compliant = constraints.compliance is not None or constraints.tangential_softness.any()
+        compliant = constraints.compliance is not None or constraints.softness[1:].any()
         if compliant and constraints.tangents:
             slips = constraints.elastic_slips(solution.multiplier, solution.tangential)
             elastic_slip[name] = constraints.positions, slips

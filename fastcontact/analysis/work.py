@@ -356,13 +356,11 @@ def _forces(
     force_vectors = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
     normals = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     inverse_area = 1.0 / np.where(constraints.finite_areas > 0.0, constraints.finite_areas, np.inf)
-    compliance = constraints.normal_compliance
-    penetration = np.zeros(len(constraints)) if compliance is None else compliance.apply(normal)
-    penetration = penetration - constraints.wear_softness * normal
+    penetration = constraints.elastic_gaps(normal) - constraints.wear_softness * normal
     if constraints.law is not None:  # The energy of the law is not that of a linear spring.
         energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * inverse_area)
         penetration = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
-    stored = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
+    stored = float(normal @ penetration) + float((constraints.softness[1:] * tangents.T**2).sum())
     all_forces = np.column_stack([normal, tangents]).T
     amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
     nodes, added = pair.node_candidates, np.zeros(len(contact.gap))
