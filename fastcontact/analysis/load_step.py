@@ -72,18 +72,13 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     solution = newton_with_wear(step)
     if problem.heat is not None:
         arguments = step, load_without_conduction, rise, solution, newton_with_wear
-        temperatures, solution = thermal_coupling.settle_heat(problem.heat, *arguments)
+        solution = thermal_coupling.settle_heat(problem.heat, *arguments)
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     step = replace(step, state=replace(step.state, wear=solution.wear))
-    if problem.heat is None:
-        return _end_of_step(step, solution, None, iterations)
-    end, result = _end_of_step(step, solution, temperatures.rise, iterations)
-    return end, thermal_coupling.with_heat_results(problem.heat, temperatures, result)
+    return _end_of_step(step, solution, iterations)
 
 
-def _end_of_step(
-    step: StepContext, solution: StepEquilibrium, rise: Array | None, iterations: dict[str, Any]
-) -> tuple[State, StepResult]:
+def _end_of_step(step: StepContext, solution: StepEquilibrium, iterations: dict[str, Any]) -> tuple[State, StepResult]:
     """Return the state and the result at the end of a load step.
 
     Parameters
@@ -92,16 +87,14 @@ def _end_of_step(
         Data at the beginning of the step.
     solution : StepEquilibrium
         The converged equilibrium.
-    rise : ndarray (n_points,), optional
-        The converged temperature rise, in models with conduction of heat [temperature].
     iterations : dict
         Numbers of iterations, for `StepResult.iterations`; it is modified.
     """
     problem, start, load = step.problem, step.state, step.load
-    settled, u, balance = solution.settled, solution.u, solution.balance
+    settled, u, balance, temperatures = solution.settled, solution.u, solution.balance, solution.temperatures
     end = replace(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        instant=load.instant, rise=rise,
+        instant=load.instant, rise=None if temperatures is None else temperatures.rise,
     )  # fmt: skip
     bodies = None
     if problem.bodies is not None and solution.terms is not None:
@@ -135,7 +128,10 @@ def _end_of_step(
         moved = {"undetermined": free.by_body(), "moved": largest((u - start.u)[moving])}
         iterations["regularised"] = report | moved
     end = replace(end, solver=problem.solver.snapshot())
-    return end, recover(problem, end, step.index, contact, balance.reaction, iterations, bodies)
+    result = recover(problem, end, step.index, contact, balance.reaction, iterations, bodies)
+    if problem.heat is not None and temperatures is not None:
+        result = thermal_coupling.with_heat_results(problem.heat, temperatures, result)
+    return end, result
 
 
 def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> StepContext:

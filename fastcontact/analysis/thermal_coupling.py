@@ -57,8 +57,8 @@ def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Ar
 
 def settle_heat(
     heat: Heat, step: StepContext, load: StepLoad, rise: Array, equilibrium: StepEquilibrium, solve: Solve
-) -> tuple[Temperatures, StepEquilibrium]:
-    """Return the temperatures and the equilibrium of a load step.
+) -> StepEquilibrium:
+    """Return the equilibrium of a load step with its temperatures.
 
     Parameters
     ----------
@@ -89,7 +89,8 @@ def settle_heat(
         settled = change <= tolerance * largest(temperatures.rise) or not problem.model.expands
         negligible = max(tolerance * equilibrium.balance.largest, equilibrium.balance.noise)
         if settled or largest(problem.model.expansion_forces(problem.field, difference).ravel()) <= negligible:
-            return replace(temperatures, balance={**temperatures.balance, "exchanges": exchange}), equilibrium
+            temperatures = replace(temperatures, balance={**temperatures.balance, "exchanges": exchange})
+            return replace(equilibrium, temperatures=temperatures)
         rise = mixing.mixed(rise, temperatures.rise)
         equilibrium = solve(step.with_load(thermal_load(problem, load, rise)), equilibrium)
     size, accepted = largest(temperatures.rise), ""

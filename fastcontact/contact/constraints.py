@@ -278,7 +278,7 @@ class Constraints:
         shapes |= {"slip0": (k, m), "elastic_slip": (k, m)}
         shapes |= {"softness": (1 + k, m), "low_rank_compliance": (1 + k, m, 0)}
         for name, shape in shapes.items():
-            if not (values := getattr(self, name)).size:
+            if not (values := getattr(self, name)).any():  # also zeros for another number of tangents
                 object.__setattr__(self, name, np.zeros(shape, values.dtype))
 
     def __len__(self) -> int:
