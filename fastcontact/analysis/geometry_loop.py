@@ -339,17 +339,16 @@ def newton_step(
     accuracy : float
         Sufficient relative accuracy of the change [-].
     """
-    constraints, nodes = settled.constraints, settled.nodes
+    constraints, solution, nodes = settled.constraints, settled.solution, settled.nodes
     u, dofs = step.state.u.copy(), step.problem.dofs
     u[dofs.active] = image
     displacement = step.problem.displacement(u)
     if nodes is not None:
-        settled = replace(settled, solution=nodes.with_distributed_forces(settled.solution, constraints, u))
-    response = settled.solution.response
-    if response is None or not (geometries := _linearised(settled, displacement)):
+        solution = nodes.with_distributed_forces(solution, constraints, u)
+    if solution.response is None or not (geometries := _linearised(constraints, solution, displacement)):
         return None
     try:
-        respond = response()
+        respond = solution.response()
     except LinAlgError:
         return None
     contact, gaps = dofs.contact, np.zeros((1 + len(constraints.tangents), len(constraints)))
@@ -383,14 +382,17 @@ def newton_step(
     return next_pairing, response_size / (largest_change * largest(v) or 1.0)
 
 
-def _linearised(settled: SettledContact, displacement: Array) -> list[tuple[slice, Linearised]]:
+def _linearised(
+    constraints: StackedConstraints, solution: Solution, displacement: Array
+) -> list[tuple[slice, Linearised]]:
     """Return the rows and the linearised geometry of each pair in contact; empty if one of them has no derivatives."""
     geometries = []
-    for name, (part, solution) in settled.parts.items():
-        if (part.tied is not None and part.geometry is None) or not solution.multiplier.any():
+    for name, rows in constraints.rows.items():
+        part, multiplier = constraints.parts[name], solution.multiplier[rows]
+        if (part.tied is not None and part.geometry is None) or not multiplier.any():
             continue
         if part.geometry is None:
             return []
-        linearised = part.geometry(solution.multiplier, solution.tangential, displacement)
-        geometries.append((settled.constraints.rows[name], linearised))
+        tangential = solution.tangential[rows, : len(part.tangents)]
+        geometries.append((rows, part.geometry(multiplier, tangential, displacement)))
     return geometries
