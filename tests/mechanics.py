@@ -117,7 +117,7 @@ def displaced_gaps(settled, u: np.ndarray, sizes: Sizes) -> float:
     state, constraints = settled.solution, settled.constraints
     if any(part.branches is not None for part in constraints.parts.values()):
         return 0.0
-    closed = state.active & (constraints.softness == 0.0) & (constraints.wear_softness == 0.0)
+    closed = state.active & (constraints.softness[0] == 0.0)
     for name, rows in constraints.rows.items():
         closed[rows] &= not constraints.parts[name].coupled
     if settled.nodes is not None:

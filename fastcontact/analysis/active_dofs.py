@@ -84,11 +84,11 @@ class ActiveDofs:
         rows, offsets = [], np.vstack([constraints.gap0, constraints.slip0])
         shape = len(constraints), len(self.unknowns)
         threshold = np.full((1 + len(constraints.tangents), len(constraints)), NOTABLE)
-        threshold[0, constraints.softness > 0.0] = SINGLE_PRECISION
+        threshold[0, constraints.softness[0] > 0.0] = SINGLE_PRECISION
         for k, R in enumerate((constraints.B, *constraints.tangents)):
             reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
             active = csr_array((reduced.data, self._numbers[reduced.indices], reduced.indptr), shape=shape)
             rows.append(without_round_off(active, R, threshold[k]))
-        prescribed = constraints.usable & (constraints.softness > 0.0) & (np.diff(rows[0].indptr) == 0)
+        prescribed = constraints.usable & (constraints.softness[0] > 0.0) & (np.diff(rows[0].indptr) == 0)
         tangents, slip0 = tuple(rows[1:]), offsets[1:]
         return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tangents, slip0=slip0, prescribed=prescribed)

@@ -27,7 +27,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.analysis.solution import Accuracy, Response, Solution, response
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.constraints import Compliance, Constraints
+from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.delassus import lu_solver
 from fastcontact.linear.protocol import Loaded
 
@@ -73,8 +73,8 @@ def solve(
         return next_active is not None
 
     while True:
-        rows, compliance, next_active = np.flatnonzero(active), constraints.normal_compliance, None
-        C = None if compliance is None else compliance.block_operator(rows)
+        rows, next_active = np.flatnonzero(active), None
+        C = constraints.normal_compliance_operator(rows)
         nodes = None if constraints.nodes is None else constraints.nodes[rows]
         B, values = constraints.B[rows], -constraints.gap0[rows]
         u, forces = loaded.solve(B, values, C, guess, monitor, accuracy.residual, nodes)
@@ -85,7 +85,7 @@ def solve(
             continue
         solution = _with_next_set(constraints, accuracy, equations, u, forces, active)
         if solution.settled or iteration == accuracy.max_iterations:
-            return replace(solution, iterations=iteration, response=partial(_response, loaded, B, rows, compliance))
+            return replace(solution, iterations=iteration, response=partial(_response, loaded, B, rows, constraints))
         earlier_sets.add(active.tobytes())
         least_index = least_index or solution.wanted.tobytes() in earlier_sets
         if least_index:
@@ -95,13 +95,15 @@ def solve(
         iteration += 1
 
 
-def _response(loaded: Loaded, B: csr_array, rows: Indices, compliance: Compliance | None) -> Response:
+def _response(loaded: Loaded, B: csr_array, rows: Indices, constraints: Constraints) -> Response:
     """Return the linear response to additional forces and gaps, while the constraints `rows` (q,) stay active.
 
-    `B` (q, n) contains the rows of these constraints, and `compliance` is that of all constraints.
+    `B` (q, n) contains the rows of these constraints.
     """
-    F, C = loaded.delassus(B)[1], np.zeros(len(rows)) if compliance is None else compliance.block(rows)
-    solve_dense = lu_solver(F + (np.diag(C) if C.ndim == 1 else C)) if len(rows) else np.zeros_like
+    F, C = loaded.delassus(B)[1], constraints.normal_compliance(rows)
+    if C is not None:
+        F = F + (np.diag(C) if C.ndim == 1 else C)
+    solve_dense = lu_solver(F) if len(rows) else np.zeros_like
     return response(loaded, B, rows, lambda gaps: -solve_dense(gaps))
 
 
@@ -125,11 +127,9 @@ def _with_next_set(
     error : float
         Relative error of an unconverged solution; signs of values within this error are ignored [-].
     """
-    multiplier, compliance = np.zeros(len(active)), constraints.normal_compliance
+    multiplier = np.zeros(len(active))
     multiplier[active] = forces
-    gap = constraints.gap0 + constraints.B @ u
-    if compliance is not None:
-        gap += compliance.apply(multiplier)
+    gap = constraints.gap0 + constraints.B @ u + constraints.elastic_gaps(multiplier)
     tension_bound = max(accuracy.multiplier, error) * np.abs(forces).max(initial=0.0)
     gap_bound = max(accuracy.gap, error * np.abs(u).max(initial=0.0)) if error else accuracy.gap
     next_active = np.where(active, multiplier > -tension_bound, gap < -gap_bound) & constraints.usable | equations

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fastcontact.analysis.geometry_loop import SettledContact
-from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.solution import Solution
-from fastcontact.analysis.state import State
 from fastcontact.analysis.work import ContactForces, contact_work
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
@@ -27,27 +27,24 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SUM_ROUND_OFF
 
 
 def contact_results(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
+    step: StepContext, settled: SettledContact, u: Array, first_contact: Mapping[str, tuple[Array, Array]]
 ) -> dict[str, ContactResult]:
-    """Return the results of all contact pairs.
+    """Return the results of all contact pairs at the end of a load step.
 
     Parameters
     ----------
-    problem : Problem
-    start : State
-        State at the beginning of the step.
-    load : StepLoad
+    step : StepContext
     settled : SettledContact
-    end : State
-        State at the end of the step; its displacements and its points of first contact are used.
+    u : ndarray (n_dofs,)
+        Displacements at the end of the step [length].
+    first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
+        See `State.first_contact`.
     """
-    displacement = problem.displacement(end.u)
-    paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
-    results = {}
-    for name, rows in settled.constraints.rows.items():
-        configuration = problem.configuration(name, start, load, paired_at, end.u)
-        arguments = settled.constraints.parts[name], settled.solution, rows, configuration, displacement
-        results[name] = contact_result(name, problem.pairs[name], *arguments, end.first_contact.get(name))
+    problem, displacement, results = step.problem, step.problem.displacement(u), {}
+    for name, part in settled.parts.items():
+        configuration = problem.pairing_configuration(name, step.state, step.load, u)
+        arguments = *part, configuration, displacement, first_contact.get(name)
+        results[name] = contact_result(name, problem.pairs[name], *arguments)
         if problem.model.periodic_interfaces:
             results[name] = _with_periodic_nodes(problem.pairs[name], results[name])
         if problem.model.strain == "finite":
@@ -56,7 +53,7 @@ def contact_results(
 
 
 def contact_result(
-    name: str, pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
+    name: str, pair: Formulation, constraints: Constraints, solution: Solution, configuration: Configuration,
     displacement: Array, axis: tuple[Array, Array] | None,
 ) -> ContactResult:  # fmt: skip
     """Return the result of one pair at the end of a load step.
@@ -68,9 +65,7 @@ def contact_result(
     constraints : Constraints
         Constraints of the pair in the last pairing.
     solution : Solution
-        Solution of all pairs.
-    rows : slice
-        Rows of this pair in the solution.
+        Solution of the pair.
     configuration : Configuration
         Configuration of the last pairing of the step.
     displacement : ndarray (n_points, dim)
@@ -80,14 +75,14 @@ def contact_result(
     """
     points = pair.secondary.points
     coordinates = pair.points[points]
-    multiplier, active = solution.multiplier[rows], solution.active[rows]
+    multiplier, active = solution.multiplier, solution.active
     active = active if constraints.wetted is None else active & ~constraints.wetted.rows
     gap, normal = pair.nodal_gap(configuration, displacement=displacement)
     active_gaps = active[: len(constraints.normal_forces(multiplier))]
     closed, pressure, field, scale = _closed_nodes(pair, constraints, multiplier, active_gaps, gap, configuration)
     if pair.options.kind == "tied":  # normals of the undeformed configuration
         normal = pair.nodal_gap(replace(configuration, displacement=np.zeros_like(configuration.displacement)))[1]
-    shear, sticking, tangential = _tangential_results(constraints, solution, rows, normal, closed, scale)
+    shear, sticking, tangential = _tangential_results(constraints, solution, normal, closed, scale)
     finite_normal = np.where(np.isfinite(normal), normal, 0.0)
     if tangential is not None:
         shear = _within_cone(constraints, shear, pressure, finite_normal, pair.secondary)
@@ -172,19 +167,19 @@ def _nodal_forces(
 
 
 def _tangential_results(
-    constraints: Constraints, solution: Solution, rows: slice, normal: Array, closed: Mask, scale: Array
+    constraints: Constraints, solution: Solution, normal: Array, closed: Mask, scale: Array
 ) -> tuple[Array, Mask, Array | None]:
     """Return nodal shear (n_nodes, dim) [pressure], sticking nodes, and tangential forces (m, k) [force] or None."""
-    multiplier, all_nodes = solution.multiplier[rows], np.ones(len(normal), bool)
+    multiplier, all_nodes = solution.multiplier, np.ones(len(normal), bool)
     if constraints.tied is not None and constraints.tied.directions:
         _, tangential = constraints.tied.forces(multiplier)
         shear = _nodal_shear(constraints, constraints.tied.directions, tangential, normal)
         return np.where(closed[:, None], shear, 0.0), all_nodes, None
     if not constraints.tangents:
         return np.zeros_like(normal), all_nodes, None
-    tangential = solution.tangential[rows]
+    tangential = solution.tangential
     shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
-    sticking, pressure = solution.sticking[rows], constraints.pressure(multiplier)
+    sticking, pressure = solution.sticking, constraints.pressure(multiplier)
     if len(sticking) != len(pressure):  # a node sticks if most of its pressure is due to sticking constraints
         sticking = constraints.nodal_field.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
     elif not constraints.usable.all():
@@ -332,15 +327,15 @@ def _within_cone(constraints: Constraints, shear: Array, pressure: Array, normal
         shear = within + received - np.einsum("nd,nd->n", received, normal)[:, None] * normal
 
 
-def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows: slice, result: ContactResult) -> Array:
+def mean_slip_before_closing(constraints: Constraints, solution: Solution, result: ContactResult) -> Array:
     """Return the part (n_nodes, dim) of the nodal slips in this step that precedes the closing of the nodes [length].
 
     The step must have been solved in increments. The slip at a node is a mean over nearby constraints, weighted by their
     contact forces. For parameters see `contact_result`.
     """
     assert solution.slip_before_closing is not None
-    forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
-    slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))
+    forces = np.maximum(constraints.normal_forces(solution.multiplier), 0.0)
+    slips = np.einsum("mk,kmd->md", solution.slip_before_closing, np.stack(constraints.directions))
     pressure, mean = constraints.nodal_field.side_pressure(forces)[:, None], np.zeros_like(result.coordinates)
     np.divide(constraints.nodal_field.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
     # The nodal values of a field may exceed the values from which it is computed.
@@ -349,20 +344,20 @@ def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows:
 
 
 def with_work(
-    pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
+    pair: Formulation, constraints: Constraints, solution: Solution, configuration: Configuration,
     contact: ContactResult, before: ContactForces | None,
 ) -> tuple[ContactResult, ContactForces, tuple[float, float, float]]:  # fmt: skip
     """Return the result of a pair with its frictional work, its contact forces, and its work in the step.
 
     For the parameters, and for the last two values, see `contact_work`.
     """
-    forces, work, slip_integrals = contact_work(pair, constraints, solution, rows, configuration, contact, before)
+    forces, work, slip_integrals = contact_work(pair, constraints, solution, configuration, contact, before)
     sliding_load = None
     if pair.friction:
         # If the step is solved at once, slips of sticking constraints are elastic. If it is solved in increments, a
         # constraint that sticks at the end may have slid before.
         at_once = solution.integrals is None
-        sliding = np.where(solution.sticking[rows], 0.0, slip_integrals) if at_once else slip_integrals
+        sliding = np.where(solution.sticking, 0.0, slip_integrals) if at_once else slip_integrals
         # Like the contact force, the integral is distributed to nodes that are closed at the beginning or at the end.
         closed = contact.active if before is None else contact.active | (before.pressing > 0.0)
         pressures = closed_node_pressures(constraints, constraints.normal_forces(sliding), closed, pair.secondary)[1]

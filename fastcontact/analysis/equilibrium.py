@@ -22,6 +22,7 @@ from scipy.sparse import bsr_array, csr_array
 from fastcontact._tools.records import field, record
 from fastcontact.analysis.criteria import LINEAR_ERROR, NOTABLE
 from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
@@ -314,6 +315,8 @@ class StepEquilibrium:
         Convergence data of each Newton iteration; empty if all bodies are linear.
     wear : dict of str to WearCompliance
         Wear of each contact pair with a law of wear.
+    temperatures : Temperatures, optional
+        Temperatures and heat flows, in models with conduction of heat.
     """
 
     settled: SettledContact | None
@@ -322,6 +325,7 @@ class StepEquilibrium:
     terms: Terms | None = None
     newton: list[dict[str, Any]] = field(default_factory=list)
     wear: Mapping[str, WearCompliance] = field(default_factory=dict)
+    temperatures: Temperatures | None = None
 
     def counts(self, linear_iterations: int) -> dict[str, Any]:
         """Return the numbers of iterations of the step, see `StepResult.iterations`.

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -31,7 +32,7 @@ from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import RESIDUAL, ScatterWindow, Tolerances
 from fastcontact.arrays import Array, largest
-from fastcontact.contact.constraints import Linearised, StackedConstraints
+from fastcontact.contact.constraints import Constraints, Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -69,6 +70,12 @@ class SettledContact:
     scatter: dict[str, float] | None = None
     nodes: SharedNodes | None = None
     paired_at: Array | None = None
+
+    @cached_property
+    def parts(self) -> dict[str, tuple[Constraints, Solution]]:
+        """Constraints and solution of each contact pair."""
+        parts, rows = self.constraints.parts, self.constraints.rows
+        return {name: (part, self.solution.part(rows[name], part)) for name, part in parts.items()}
 
     @property
     def force(self) -> Array:

@@ -77,13 +77,11 @@ class Iterate:
 
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
     """Return the constraints of all pairs, from the deformed or, with `keep_pairing`, from the undeformed configuration."""
-    displacement, u = problem.displacement(iterate.u).copy(), iterate.u  # a copy, since iterations reuse the array
-    if problem.force_driven.pairs:
-        u = np.where(problem.system.fixed, load.lift, u)
-    paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
+    u, driven = iterate.u.copy(), slice(problem.model.n_dofs, None)  # a copy, since iterations reuse the array
+    u[driven] = np.where(problem.system.fixed[driven], load.lift[driven], u[driven])
     parts = {}
     for name, pair in problem.pairs.items():
-        configuration = problem.configuration(name, state, load, paired_at, u)
+        configuration = problem.pairing_configuration(name, state, load, u)
         pressure, fluid = iterate.pressure.get(name), iterate.fluid.get(name)
         if pressure is not None and fluid is not None:  # impermeable where the fluid has been displaced too often
             pressure = np.where(fluid[1] < DISPLACEMENTS_UNTIL_DRY, pressure, np.inf)
@@ -149,6 +147,12 @@ class StepContext:
     index: int = 0
     condensed_size: float = 0.0
     path: LoadPath | LastIncrement | None = None
+
+    def with_load(self, load: StepLoad) -> StepContext:
+        """Return the data of the step with another load; nonlinear bodies are linearised under it in `newton`."""
+        if self.problem.bodies is not None:
+            return replace(self, load=load)
+        return replace(self, load=load, loaded=self.problem.loaded(load))
 
     @property
     def linearises_contact(self) -> bool:

@@ -10,7 +10,6 @@ is the place to start reading the code.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -63,29 +62,23 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ConvergenceError
         If the step does not converge.
     """
-    load, heat = problem.load_at(instant), problem.heat
-    load_without_conduction = load
-    if heat is not None:
-        rise = thermal_coupling.first_rise(problem, heat, state, instant)
+    load = load_without_conduction = problem.load_at(instant)
+    if problem.heat is not None:
+        rise = thermal_coupling.first_rise(problem, problem.heat, state, instant)
         load = thermal_coupling.thermal_load(problem, load, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     step = prepare_start(problem, state, index, load)
-    solution = newton_with_wear(step, load)
-    if heat is not None:
-        arguments = step.state, load_without_conduction, instant, rise, solution, partial(newton_with_wear, step)
-        temperatures, solution = thermal_coupling.settle_heat(problem, heat, *arguments)
+    solution = newton_with_wear(step)
+    if problem.heat is not None:
+        arguments = step, load_without_conduction, rise, solution, newton_with_wear
+        solution = thermal_coupling.settle_heat(problem.heat, *arguments)
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     step = replace(step, state=replace(step.state, wear=solution.wear))
-    if heat is None:
-        return _end_of_step(step, solution, instant, None, iterations)
-    end, result = _end_of_step(step, solution, instant, temperatures.rise, iterations)
-    return end, thermal_coupling.with_heat_results(heat, temperatures, result)
+    return _end_of_step(step, solution, iterations)
 
 
-def _end_of_step(
-    step: StepContext, solution: StepEquilibrium, instant: float, rise: Array | None, iterations: dict[str, Any]
-) -> tuple[State, StepResult]:
+def _end_of_step(step: StepContext, solution: StepEquilibrium, iterations: dict[str, Any]) -> tuple[State, StepResult]:
     """Return the state and the result at the end of a load step.
 
     Parameters
@@ -94,19 +87,15 @@ def _end_of_step(
         Data at the beginning of the step.
     solution : StepEquilibrium
         The converged equilibrium.
-    instant : float
-        Pseudo-time at the end of the step [-].
-    rise : ndarray (n_points,), optional
-        The converged temperature rise, in models with conduction of heat [temperature].
     iterations : dict
         Numbers of iterations, for `StepResult.iterations`; it is modified.
     """
     problem, start, load = step.problem, step.state, step.load
-    settled, u, balance = solution.settled, solution.u, solution.balance
-    obstacles = problem.obstacles_at(load, u)
+    settled, u, balance, temperatures = solution.settled, solution.u, solution.balance, solution.temperatures
     end = replace(
-        start, u=u, largest_force=balance.largest, obstacles=obstacles, angles=load.angles, instant=instant, rise=rise
-    )
+        start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
+        instant=load.instant, rise=None if temperatures is None else temperatures.rise,
+    )  # fmt: skip
     bodies = None
     if problem.bodies is not None and solution.terms is not None:
         bodies = solution.terms.bodies_at(u)
@@ -124,8 +113,7 @@ def _end_of_step(
     if problem.extrapolates:
         contact_data = {}
         if settled is not None:
-            gap, force = settled.solution.gap, settled.solution.multiplier
-            contact_data = {name: (gap[rows], force[rows]) for name, rows in settled.constraints.rows.items()}
+            contact_data = {name: (part.gap, part.multiplier) for name, (_, part) in settled.parts.items()}
         extrapolation = start.extrapolation.after(u, contact_data, problem.bodies is not None)
         end = replace(end, extrapolation=extrapolation)
     if end.work is not None:
@@ -140,7 +128,10 @@ def _end_of_step(
         moved = {"undetermined": free.by_body(), "moved": largest((u - start.u)[moving])}
         iterations["regularised"] = report | moved
     end = replace(end, solver=problem.solver.snapshot())
-    return end, recover(problem, end, step.index, contact, balance.reaction, iterations, bodies)
+    result = recover(problem, end, step.index, contact, balance.reaction, iterations, bodies)
+    if problem.heat is not None and temperatures is not None:
+        result = thermal_coupling.with_heat_results(problem.heat, temperatures, result)
+    return end, result
 
 
 def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> StepContext:
@@ -151,7 +142,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     solution without contact is then used, see `StepContext.expected`.
     """
     load_as_force = load if load.rise is None else thermal_coupling.expansion_as_force(problem, load)
-    loaded = problem.solver.load(problem.system.right_side(load_as_force.force, load_as_force.lift))
+    loaded = problem.loaded(load_as_force)
     round_off, rigid_force, expected = state.gap_round_off, state.largest_rigid_force, 0.0
     zero = np.zeros(len(load.lift))
     if problem.pairs and load_as_force.force.any() and not (state.u.any() or load.lift.any()):
@@ -198,26 +189,24 @@ def _contact_at_end(
     energy : (float, float)
         Elastic strain energy and plastic work [energy].
     """
-    problem, start, load = step.problem, step.state, step.load
-    displacement, solution = problem.displacement(end.u), settled.solution
-    parts, rows_of_pairs = settled.constraints.parts, settled.constraints.rows
+    problem, start = step.problem, step.state
     configurations, first_contact = {}, dict(start.first_contact)
-    for name in parts:
-        configurations[name] = problem.configuration(name, start, load, displacement, end.u)
+    for name in settled.parts:
+        configurations[name] = problem.configuration(name, start, step.load, end.u)
         if problem.model.mesh.dim == 3 and name not in first_contact:
             first_contact[name] = problem.pairs[name].first_contact(configurations[name])
-    results = contact_results(problem, start, load, settled, replace(end, first_contact=first_contact))
+    results = contact_results(step, settled, end.u, first_contact)
     touched, never_opening, worn = set(start.touched), dict(start.never_opening), dict(start.worn)
     slipped, forces, elastic_slip, bonds = dict(start.slipped), dict(start.forces), {}, {}
     work_increments, work_on_wear = np.zeros(3), 0.0
     for name, configuration in configurations.items():
-        pair, constraints, rows = problem.pairs[name], parts[name], rows_of_pairs[name]
+        pair, (constraints, solution) = problem.pairs[name], settled.parts[name]
         if pair.options.kind == "bilateral_once_closed":
             # Points that have slid beyond the other side are included, since they may return to it.
-            never_opening[name] = constraints.positions, solution.active[rows] | constraints.equality
-        compliant = constraints.compliance is not None or constraints.tangential_softness.any()
+            never_opening[name] = constraints.positions, solution.active | constraints.equality
+        compliant = constraints.compliance is not None or constraints.softness[1:].any()
         if compliant and constraints.tangents:
-            slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
+            slips = constraints.elastic_slips(solution.multiplier, solution.tangential)
             elastic_slip[name] = constraints.positions, slips
         contact, slip = results[name], np.zeros_like(results[name].coordinates)
         if contact.active.any():
@@ -228,7 +217,7 @@ def _contact_at_end(
             rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
             slip = pair.nodal_slip(configuration)
             if solution.slip_before_closing is not None and constraints.tangents:
-                slip -= mean_slip_before_closing(constraints, solution, rows, contact)
+                slip -= mean_slip_before_closing(constraints, solution, contact)
             slip = np.where((contact.active & ~rigid_stick)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         contact = replace(contact, slip=slip, slip_total=slipped[name])
@@ -236,7 +225,7 @@ def _contact_at_end(
             bonds[name] = constraints.tied.bond_after(constraints, end.u)
             contact = replace(contact, damage=bonds[name].at(contact.coordinates)[1])
         elif pair.options.kind not in ("tied", "gap_only"):
-            arguments = pair, constraints, solution, rows, configuration, contact
+            arguments = pair, constraints, solution, configuration, contact
             contact, forces[name], work_of_pair = with_work(*arguments, start.forces.get(name))
             work_increments += work_of_pair
         if pair.options.wear is not None:

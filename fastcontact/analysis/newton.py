@@ -37,15 +37,13 @@ log = logging.getLogger("fastcontact")
 GAP_STIFFNESS = 2e-4
 
 
-def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> StepEquilibrium:
+def newton(begin: StepContext, before: StepEquilibrium | None = None) -> StepEquilibrium:
     """Return the equilibrium of a load step.
 
     Parameters
     ----------
     begin : StepContext
         Data at the beginning of the step, with the linear solver prepared for zero displacements.
-    load : StepLoad
-        Load of `begin`, or the same load with other temperatures.
     before : StepEquilibrium, optional
         Equilibrium of the same step under nearly the same load, from which the iterations start.
 
@@ -55,13 +53,10 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
         If the iterations do not converge, a cell is inverted, or forces stay out of balance.
     """
     if begin.problem.bodies is not None:
-        return _nonlinear_equilibrium(begin, load, before)
-    problem, start, u, settled = begin.problem, begin.state, begin.state.u, None
+        return _nonlinear_equilibrium(begin, before)
+    problem, start, load, u = begin.problem, begin.state, begin.load, begin.state.u
     iterate = Iterate.of(start) if before is None or before.settled is None else before.settled.iterate
     while True:  # until the forces balance, with more accurate linear solutions
-        if load is not begin.load or settled is not None:
-            loaded = problem.solver.load(problem.system.right_side(load.force, load.lift))
-            begin = replace(begin, load=load, loaded=loaded)
         settled = settle_geometry(begin, iterate)
         u, contact_force = equilibrium.solve_displacements(begin, settled, u)
         force = problem.system.K @ u
@@ -73,19 +68,20 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
             return StepEquilibrium(settled, u, force_balance)
         if not problem.solver.improve(force_balance.accuracy_factor):
             raise force_balance.failure(begin.index, problem, iterate.history)
+        begin = begin.with_load(load)
 
 
-def _nonlinear_equilibrium(begin: StepContext, load: StepLoad, before: StepEquilibrium | None) -> StepEquilibrium:
+def _nonlinear_equilibrium(begin: StepContext, before: StepEquilibrium | None) -> StepEquilibrium:
     """Return the result of `newton` for nonlinear bodies, from a predicted displacement if there is one."""
     start = begin.state
     if before is not None or start.extrapolation.ratio:
         origin = start.extrapolation.predicted(start.u) if before is None else before.u
         try:
-            return _Newton(begin, load).equilibrium_from(origin)
+            return _Newton(begin).equilibrium_from(origin)
         except ConvergenceError as error:
             log.info("the step restarts from the previous displacement instead of a predicted one: %s", error)
             before = None
-    return _Newton(begin, load, before).equilibrium_from(start.u)
+    return _Newton(begin, before).equilibrium_from(start.u)
 
 
 @dataclass(frozen=True)
@@ -118,9 +114,9 @@ class Regularisation:
 class _Newton:
     """The iterations of a load step with nonlinear bodies; see `newton` for the parameters."""
 
-    def __init__(self, begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> None:
-        self._problem, self._begin, self._start, self._load = begin.problem, begin, begin.state, load
-        self._terms = Terms(begin.problem, begin.state, load)
+    def __init__(self, begin: StepContext, before: StepEquilibrium | None = None) -> None:
+        self._problem, self._begin, self._start, self._load = begin.problem, begin, begin.state, begin.load
+        self._terms = Terms(begin.problem, begin.state, begin.load)
         self._tolerance = max(begin.problem.criteria.geometry, TOLERANCE)  # of the relative error of the displacements
         settled = None if before is None else before.settled
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
@@ -306,7 +302,7 @@ class _Newton:
         step = replace(
             self._begin, problem=replace(problem, criteria=replace(problem.criteria, geometry=tolerance)), load=load,
             state=replace(self._start, extrapolation=Extrapolation()),
-            loaded=problem.solver.load(problem.system.right_side(load.force, load.lift)),
+            loaded=problem.loaded(load),
         )  # fmt: skip
         paired = self._settled if self._has_full_step and problem.linearised_at is None else None
         settled = settle_geometry(step, iterate, paired)

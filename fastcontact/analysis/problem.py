@@ -37,7 +37,7 @@ from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ContactError
 from fastcontact.linear import choice
-from fastcontact.linear.protocol import TOLERANCE, LinearSolver
+from fastcontact.linear.protocol import TOLERANCE, LinearSolver, Loaded
 from fastcontact.linear.sparse_rows import stacked_rows, sum_of_blocks
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import ROTATION
@@ -81,6 +81,8 @@ class StepLoad:
         Fluid pressure at the source of each contact pair that fluid may enter [pressure].
     rise : ndarray (n_points,), optional
         Temperature rise, which strains nonlinear bodies [temperature]. For linear bodies, `force` includes its nodal forces.
+    instant : float
+        Pseudo-time at the end of the step [-].
     """
 
     lift: Array
@@ -92,6 +94,7 @@ class StepLoad:
     friction_factors: Mapping[str, float] = field(default_factory=dict)
     fluids: Mapping[str, float] = field(default_factory=dict)
     rise: Array | None = None
+    instant: float = 0.0
 
 
 @record
@@ -215,7 +218,11 @@ class Problem:
         following = tuple(factor(table) for _, table in self.following)
         temperatures = self.factors(self.model.temperatures, instant)
         rise = None if self.bodies is None else self.model.temperature_rise(temperatures)
-        return StepLoad(lift, force, obstacles, clearances, angles, following, friction, fluids, rise)
+        return StepLoad(lift, force, obstacles, clearances, angles, following, friction, fluids, rise, instant)
+
+    def loaded(self, load: StepLoad) -> Loaded:
+        """Return the prepared matrix with the right-hand side of a load."""
+        return self.solver.load(self.system.right_side(load.force, load.lift))
 
     def factors(
         self, histories: Iterable[Temperature | InitialState | Pretension | Load | MultiPointConstraint], instant: float
@@ -248,8 +255,8 @@ class Problem:
         driven = self.force_driven.displacements(u) if self.force_driven.pairs else {}
         return {**load.obstacles, **driven}
 
-    def configuration(self, name: str, state: State, load: StepLoad, displacement: Array, u: Array) -> Configuration:
-        """Return the configuration of a contact pair.
+    def configuration(self, name: str, state: State, load: StepLoad, u: Array) -> Configuration:
+        """Return the configuration of a contact pair at the end of a load step.
 
         Parameters
         ----------
@@ -258,16 +265,14 @@ class Problem:
         state : State
             State at the beginning of the load step.
         load : StepLoad
-        displacement : ndarray (n_points, dim)
-            Displacements of the points at which the surfaces are paired [length].
         u : ndarray (n_dofs,)
-            All displacements, which include those of force-driven obstacles [length].
+            Displacements of all points, and then of the force-driven obstacles [length].
         """
         zero, side, wear = np.zeros(self.model.mesh.dim), self.pairs[name].secondary, state.wear.get(name)
         worn = wear or state.worn.get(name)
         depth = None if worn is None else at_points(side.points, worn.depth, self.model.mesh.n_points)
         return Configuration(
-            displacement,
+            self.displacement(u),
             self.displacement(state.u),
             Pose(self.obstacles_at(load, u).get(name, zero), load.angles.get(name, 0.0)),
             Pose(state.obstacles.get(name, zero), state.angles.get(name, 0.0)),
@@ -281,6 +286,13 @@ class Problem:
             linearisation_point=None if self.linearised_at is None else self.displacement(self.linearised_at),
             friction_factor=load.friction_factors.get(name, 1.0),
         )
+
+    def pairing_configuration(self, name: str, state: State, load: StepLoad, u: Array) -> Configuration:
+        """Return the `configuration` in which the surfaces are paired: undeformed with `Criteria.keep_pairing`."""
+        configuration = self.configuration(name, state, load, u)
+        if self.criteria.keep_pairing:
+            return replace(configuration, displacement=np.zeros_like(configuration.displacement))
+        return configuration
 
     def deformed(
         self, u: Array, start: State, rise: Array | None, *, geometric: int = COMPLETE, tangent: bool = True

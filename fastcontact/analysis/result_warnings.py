@@ -93,7 +93,7 @@ def result_warnings(
         contact = last.contact[name]
         if pair.options.kind == "gap_only":
             continue
-        configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
+        configuration = problem.configuration(name, state, load, state.u)
         undetermined = _undetermined_tractions(pair, contact, nodes_with_undetermined_traction(pair, configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *_open_contact(problem, state, name, last, loaded)]
         warnings += undetermined

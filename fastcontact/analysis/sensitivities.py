@@ -210,7 +210,7 @@ def recomputed_step(
     closed_pairs = frozenset(name for name, contact in step.contact.items() if contact.active.any())
     state, load = restart.put_back(problem, step, closed_pairs), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
-    equilibrium = newton(prepare_start(problem, state, step.index, load), load)
+    equilibrium = newton(prepare_start(problem, state, step.index, load))
     u, no_values, inactive = equilibrium.u, np.empty(0), np.empty(0, bool)
     without_contact = Solution.frictionless(u, no_values, no_values, inactive, inactive)
     solution = without_contact if equilibrium.settled is None else equilibrium.settled.solution

@@ -88,13 +88,13 @@ class SharedNodes:
             "slip0": self._mean(constraints.slip0.T, self.tangential_fraction).T,
             "friction": self.summed(self.normal_fraction * constraints.friction),
         }
-        total = self.summed(_stiffness(constraints.softness))
+        stiffness = _stiffness(constraints.softness)
+        stiffness[1:, self.tangential_fraction <= 0.0] = 0.0
+        total = self.summed(stiffness.T).T
         merged["softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
-        if constraints.tangential_softness.any():
-            stiffness = np.where(self.tangential_fraction > 0.0, _stiffness(constraints.tangential_softness), 0.0)
-            total, finite = self.summed(stiffness), np.isfinite(stiffness)
-            merged["tangential_softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
-            weight = np.divide(stiffness, total[self.representative], out=np.ones_like(total), where=finite)
+        if constraints.softness[1:].any():
+            finite, weight = np.isfinite(stiffness[1]), np.ones(len(constraints))
+            np.divide(stiffness[1], total[1, self.representative], out=weight, where=finite)
             merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
         return replace(constraints, **merged).without(self.redundant)  # type: ignore[arg-type]
 
@@ -210,7 +210,7 @@ def _representatives(constraints: Constraints, pairs: Indices) -> Indices:
 
 
 def _stiffness(softness: Array) -> Array:
-    """Return the stiffness (m,) of constraints, infinite without compliance [force / length]."""
+    """Return the stiffness (..., m) of constraints, infinite without compliance [force / length]."""
     return np.divide(1.0, softness, out=np.full_like(softness, np.inf), where=softness > 0.0)
 
 
@@ -223,10 +223,10 @@ def _fractions(constraints: StackedConstraints, representative: Indices) -> tupl
     m = len(representative)
     is_shared = np.bincount(representative, minlength=m)[representative] > 1  # others may lack an area
     weight = np.where(is_shared, _areas(constraints), 1.0)
-    exact = constraints.softness == 0.0
+    exact = constraints.softness[0] == 0.0
     has_exact = np.bincount(representative, exact, minlength=m)[representative] > 0
     by_area = np.where(exact | ~is_shared, weight, 0.0)
-    weight = np.where(is_shared & ~has_exact, _stiffness(constraints.softness), by_area)
+    weight = np.where(is_shared & ~has_exact, _stiffness(constraints.softness[0]), by_area)
     fraction = weight / np.bincount(representative, weight, minlength=m)[representative]
     if not constraints.tangents:
         return fraction, fraction
@@ -263,7 +263,7 @@ def _dependent(constraints: StackedConstraints) -> tuple[Indices, Indices, Indic
     first, second = first[dependent], second[dependent]
     difference = constraints.gap0[second] - constraints.gap0[first]
     equal_gap = difference <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
-    behind = np.setdiff1d(second[~equal_gap & (constraints.softness[first] == 0.0)], [])
+    behind = np.setdiff1d(second[~equal_gap & (constraints.softness[0, first] == 0.0)], [])
     first, second = first[equal_gap], second[equal_gap]
     free = ~(np.isin(first, behind) | np.isin(second, behind))
     return first[free], second[free], behind

@@ -276,6 +276,16 @@ class Solution:
         settled, no_tangents = bool(np.array_equal(active, next_active)), np.zeros((len(gap), 0))
         return cls(u, multiplier, gap, active, next_active, settled, 1, no_tangents, no_tangents, active)
 
+    def part(self, rows: slice, constraints: Constraints) -> Solution:
+        """Return the solution of one contact pair, given the rows of its `constraints` in the solution of all pairs."""
+        along, early_slip = (rows, slice(len(constraints.tangents))), self.slip_before_closing
+        return Solution(
+            self.u, self.multiplier[rows], self.gap[rows], self.active[rows], self.wanted[rows], self.settled,
+            self.iterations, self.tangential[along], self.slip[along], self.sticking[rows], self.residual,
+            constraints.directions, integrals=None if self.integrals is None else self.integrals[:, rows],
+            slip_before_closing=None if early_slip is None else early_slip[along],
+        )  # fmt: skip
+
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return the normal and tangential forces (1 + k, m) in components along other tangents (m, dim) [force].
 

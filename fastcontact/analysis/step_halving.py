@@ -143,8 +143,8 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
     begin, frictionless = prepare_start(problem, state, index, load), dict.fromkeys(pairs, 0.0)
     frictionless_load = replace(load, friction_factors={**load.friction_factors, **frictionless})
     try:
-        frictionless_solution = newton(replace(begin, load=frictionless_load), frictionless_load)
-        u = newton_with_wear(begin, load, frictionless_solution).u
+        frictionless_solution = newton(replace(begin, load=frictionless_load))
+        u = newton_with_wear(begin, frictionless_solution).u
     except ConvergenceError:
         return False
     return largest(u - after.u) > NOTABLE * largest(after.u - state.u)

@@ -17,21 +17,23 @@ from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
 from fastcontact.analysis.criteria import LINEAR_ERROR, NOTABLE
 from fastcontact.analysis.equilibrium import StepEquilibrium
-from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Heat, Temperatures
+from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.cohesive_layer import CohesiveLayer
 from fastcontact.contact.conductance import heat_transfer
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations import Formulation
 from fastcontact.errors import ConvergenceError
 from fastcontact.model.parts.heat import HEAT_FLUX
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
+Solve = Callable[[StepContext, StepEquilibrium | None], StepEquilibrium]
 
 
 def with_heat_results(heat: Heat, temperatures: Temperatures, step: StepResult) -> StepResult:
@@ -54,47 +56,43 @@ def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Ar
 
 
 def settle_heat(
-    problem: Problem, heat: Heat, start: State, load: StepLoad, instant: float, rise: Array,
-    equilibrium: StepEquilibrium, solve: Solve,
-) -> tuple[Temperatures, StepEquilibrium]:  # fmt: skip
-    """Return the temperatures and the equilibrium of a load step.
+    heat: Heat, step: StepContext, load: StepLoad, rise: Array, equilibrium: StepEquilibrium, solve: Solve
+) -> StepEquilibrium:
+    """Return the equilibrium of a load step with its temperatures.
 
     Parameters
     ----------
-    problem : Problem
     heat : Heat
         Heat conduction of the problem.
-    start : State
-        State at the beginning of the step.
+    step : StepContext
     load : StepLoad
         Load at the end of the step, without thermal expansion.
-    instant : float
-        Pseudo-time at the end of the step.
     rise : ndarray (n_points,)
         Initial temperature rise [temperature].
     equilibrium : StepEquilibrium
         Equilibrium at the initial temperature rise.
     solve : callable
-        Function that returns the equilibrium, given a load and the last equilibrium.
+        Function that returns the equilibrium, given the step with another load, and the last equilibrium.
 
     Raises
     ------
     ConvergenceError
         If temperatures and contact do not converge.
     """
-    mixing = Anderson(DEPTH, np.arange(len(rise)))
+    problem, mixing = step.problem, Anderson(DEPTH, np.arange(len(rise)))
     tolerance = max(problem.criteria.geometry, LINEAR_ERROR * heat.linear_tolerance)
     change, limit = np.inf, max(problem.criteria.max_geometry_updates, 1)
     for exchange in range(1, limit + 1):
-        temperatures = _steady_temperatures(problem, heat, start, load, instant, equilibrium)
+        temperatures = _steady_temperatures(heat, step, equilibrium)
         difference = temperatures.rise - rise
         change = largest(difference)
         settled = change <= tolerance * largest(temperatures.rise) or not problem.model.expands
         negligible = max(tolerance * equilibrium.balance.largest, equilibrium.balance.noise)
         if settled or largest(problem.model.expansion_forces(problem.field, difference).ravel()) <= negligible:
-            return replace(temperatures, balance={**temperatures.balance, "exchanges": exchange}), equilibrium
+            temperatures = replace(temperatures, balance={**temperatures.balance, "exchanges": exchange})
+            return replace(equilibrium, temperatures=temperatures)
         rise = mixing.mixed(rise, temperatures.rise)
-        equilibrium = solve(thermal_load(problem, load, rise), equilibrium)
+        equilibrium = solve(step.with_load(thermal_load(problem, load, rise)), equilibrium)
     size, advice = largest(temperatures.rise), ""
     if change < NOTABLE * size:
         advice = f", or accept this accuracy with Criteria(geometry={2 * change / size:.0e})"
@@ -124,11 +122,10 @@ def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
     return replace(load, force=load.force + np.pad(forces, (0, len(load.force) - len(forces))), rise=None)
 
 
-def _steady_temperatures(
-    problem: Problem, heat: Heat, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium
-) -> Temperatures:
+def _steady_temperatures(heat: Heat, step: StepContext, equilibrium: StepEquilibrium) -> Temperatures:
     """Return the temperatures for the contact conductances and the frictional heat of an equilibrium."""
-    settled, u, displacement = equilibrium.settled, equilibrium.u, problem.displacement(equilibrium.u)
+    problem, load, settled = step.problem, step.load, equilibrium.settled
+    displacement = problem.displacement(equilibrium.u)
     n, laws, conducting = problem.model.mesh.n_points, problem.model.conductances(), {}
     contact_matrix, obstacle_matrix = csr_array((n, n)), csr_array((n, n))
     friction_power, obstacle_power = np.zeros((2, n))
@@ -136,9 +133,9 @@ def _steady_temperatures(
         law = laws.get(name)
         if settled is None or (law is None and not pair.options.friction_heat):
             continue
-        rows, solution = settled.constraints.rows[name], settled.solution
-        configuration = problem.configuration(name, start, load, displacement, u)
-        constraints, force, gap = _normal_state(problem, settled, name, rows, configuration)
+        part, solution = settled.parts[name]
+        configuration = problem.configuration(name, step.state, load, equilibrium.u)
+        constraints, force, gap = _normal_state(pair, part, solution, configuration)
         link = heat_transfer(constraints, pair.secondary, pair.primary, pair.points.shape)
         area_ratio = np.ones(n)  # ratio of deformed to undeformed area at each node
         if heat.finite_strain:
@@ -157,9 +154,11 @@ def _steady_temperatures(
                 obstacle_power = obstacle_power + link.secondary.T @ (h * link.area * obstacle_rise)
             conducting[name] = link, constraints.nodal_field, h, obstacle_rise, area_ratio[pair.secondary.points]
         if pair.options.friction_heat:
-            work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
-            friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))
-    steady = heat.temperatures(instant, displacement, contact_matrix, friction_power, (obstacle_matrix, obstacle_power))
+            work = np.maximum(-(solution.tangential * solution.slip).sum(axis=1), 0.0)
+            friction_power += link.nodal_powers(pair.options.friction_heat * work / (load.instant - step.state.instant))
+    steady = heat.temperatures(
+        load.instant, displacement, contact_matrix, friction_power, (obstacle_matrix, obstacle_power)
+    )
     fluxes, heat_flows = {}, {}
     for name, (link, field, h, obstacle_rise, area_ratio) in conducting.items():
         power = h * link.area * (link.jump @ steady.rise - obstacle_rise)
@@ -168,17 +167,16 @@ def _steady_temperatures(
 
 
 def _normal_state(
-    problem: Problem, settled: SettledContact, name: str, rows: slice, configuration: Configuration
+    pair: Formulation, constraints: Constraints, solution: Solution, configuration: Configuration
 ) -> tuple[Constraints, Array, Array]:
     """Return the constraints of a pair, their normal forces (m,) [force], and their gaps (m,), zero if closed [length]."""
-    pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
     gap_round_off = LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-    forces = np.maximum(constraints.normal_forces(constraints.contact_forces(solution.multiplier[rows])), 0.0)
+    forces = np.maximum(constraints.normal_forces(constraints.contact_forces(solution.multiplier)), 0.0)
     if pair.options.kind == "tied":
         return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))
-    closed, layer, wetted = solution.active[rows], constraints.tied, constraints.wetted
+    closed, layer, wetted = solution.active, constraints.tied, constraints.wetted
     if pair.options.kind != "gap_only" and layer is None and wetted is None:
-        gap = np.maximum(solution.gap[rows], 0.0)
+        gap = np.maximum(solution.gap, 0.0)
         return constraints, forces, np.where(closed | (gap <= gap_round_off), 0.0, gap)
     constraints = pair.unilateral(configuration)
     gap = np.maximum(constraints.gaps(configuration.displacement), 0.0)

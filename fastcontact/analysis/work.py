@@ -199,7 +199,7 @@ class Work:
 
 
 def contact_work(
-    pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
+    pair: Formulation, constraints: Constraints, solution: Solution, configuration: Configuration,
     contact: ContactResult, before: ContactForces | None,
 ) -> tuple[ContactForces, tuple[float, float, float], Array]:  # fmt: skip
     """Return the contact forces of a pair at the end of a load step, and its work in this step.
@@ -210,9 +210,7 @@ def contact_work(
     constraints : Constraints
         Constraints of the pair.
     solution : Solution
-        Contact solution of all pairs.
-    rows : slice
-        Rows of the pair in the solution.
+        Contact solution of the pair.
     configuration : Configuration
         Configuration at the end of the step.
     contact : ContactResult
@@ -228,10 +226,9 @@ def contact_work(
     slip_integrals : ndarray (m,)
         Integrals of the normal forces over the slips in the step [energy].
     """
-    normal, k = constraints.contact_forces(solution.multiplier[rows]), len(constraints.tangents)
-    tangents, slip = solution.tangential[rows, :k], solution.slip[rows, :k]
+    normal, tangents, slip = constraints.contact_forces(solution.multiplier), solution.tangential, solution.slip
     no_tangents = np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
-    directions = np.stack(constraints.directions, axis=1) if k else no_tangents
+    directions = np.stack(constraints.directions, axis=1) if constraints.tangents else no_tangents
     force, slips = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
     after = _forces(pair, configuration, constraints, normal, tangents, force, contact)
     if before is None:  # no forces before the first step
@@ -246,9 +243,8 @@ def contact_work(
     if left.any():  # Constraints that slide beyond the end of the other side have no slip there.
         nodes = pair.points[pair.secondary.points]
         slips[left] = pair.nodal_slip(configuration)[nearest(nodes, constraints.positions[left])[1]]
-    integrals = None if solution.integrals is None else solution.integrals[:, rows]
     work, touching, slip_integrals = _frictional_work(
-        pair, configuration, constraints, integrals, normals, tangential, slips,
+        pair, configuration, constraints, solution.integrals, normals, tangential, slips,
         (after.passed_on(before), before.passed_on(after)),
     )  # fmt: skip
     sliding = -0.5 * float(((tangential[0] + tangential[1]) * slips).sum())
@@ -360,13 +356,11 @@ def _forces(
     force_vectors = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
     normals = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     inverse_area = 1.0 / np.where(constraints.finite_areas > 0.0, constraints.finite_areas, np.inf)
-    compliance = constraints.normal_compliance
-    penetration = np.zeros(len(constraints)) if compliance is None else compliance.apply(normal)
-    penetration = penetration - constraints.wear_softness * normal
+    penetration = constraints.elastic_gaps(normal) - constraints.wear_softness * normal
     if constraints.law is not None:  # The energy of the law is not that of a linear spring.
         energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * inverse_area)
         penetration = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
-    stored = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
+    stored = float(normal @ penetration) + float((constraints.softness[1:] * tangents.T**2).sum())
     all_forces = np.column_stack([normal, tangents]).T
     amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
     nodes, added = pair.node_candidates, np.zeros(len(contact.gap))

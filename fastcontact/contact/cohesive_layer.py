@@ -166,12 +166,12 @@ def cohesive_rows(
         gap0=gap0 - zero_traction.ravel(),
         equality=np.tile(intact, len(separation)),
         prescribed=np.zeros(separation.size, bool),
-        softness=1.0 / (slope * law.stiffness * constraints.areas).ravel(),
+        softness=1.0 / (slope * law.stiffness * constraints.areas).reshape(1, -1),
         positions=np.tile(constraints.positions, (len(separation), 1)),
         areas=np.tile(constraints.areas, len(separation)),
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(separation)),
         compliance=None, tangents=(), directions=(), tied=layer, geometry=lambda *_: Softening(B, correction),
-        friction=no_values, slip0=no_values, tangential_softness=no_values, elastic_slip=no_values,
+        friction=no_values, slip0=no_values, elastic_slip=no_values,
         low_rank_compliance=no_values, branches=np.where(growing, 1 + axis, 0) + 4 * stiffened + 8 * ~intact,
     ).without(np.concatenate([np.zeros(m, bool), *[~intact] * len(slip0)]))  # fmt: skip
 

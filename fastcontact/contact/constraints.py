@@ -23,20 +23,16 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 class Compliance(Protocol):
-    """A symmetric positive semidefinite matrix C (m, m) for all constraints [length / force]."""
+    """A symmetric positive semidefinite matrix C (m, m) that is diagonal except for a small rank [length / force]."""
 
     def block(self, rows: Indices) -> Array:
-        """Return the submatrix (q, q) of C for the constraints `rows` (q,); if C is diagonal, only the diagonal (q,)."""
+        """Return the submatrix (q, q) of C for the constraints `rows` (q,)."""
 
     def block_operator(self, rows: Indices) -> Array | FieldCompliance:
         """Return the value of `block`, or an equivalent object that linear solvers can use without forming the submatrix."""
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C @ multiplier`` [length] for multipliers (m,) or vectors of forces (m, dim) [force]."""
-
-
-class MultiplierCompliance(Compliance, Protocol):
-    """A compliance that is diagonal except for a small rank."""
 
     def split(self, rows: Indices) -> tuple[Array, csr_array, Array]:
         """Return d (q,), P (q, k) and S (k, k) of the submatrix ``diag(d) - P S P.T`` for the constraints `rows` (q,)."""
@@ -183,7 +179,7 @@ class Tied(Protocol):
         """
 
 
-_SCALARS = "friction", "equality", "softness", "wear_softness", "tangential_softness", "prescribed"
+_SCALARS = "friction", "equality", "wear_softness", "prescribed"
 
 
 @record
@@ -201,7 +197,7 @@ class Constraints:
         Gaps at u = 0 without contact forces [length].
     positions : ndarray (m, dim)
         Points of the undeformed secondary surface at which the gaps are measured [length].
-    compliance : MultiplierCompliance, optional
+    compliance : Compliance, optional
         Compliance C of the constraints themselves [length / force].
     tangents : tuple of k csr_array (m, n_dofs)
         For each tangent, derivatives of the tangential displacement relative to the primary side with respect to the
@@ -218,12 +214,10 @@ class Constraints:
         Coefficients of friction [-].
     equality : ndarray of bool (m,)
         Whether each constraint is an equation, with a multiplier of either sign.
-    softness : ndarray (m,)
-        Compliance of each constraint along its normal, in addition to C [length / force].
+    softness : ndarray (1 + k, m)
+        Compliance of each constraint along its normal and its tangents, in addition to C [length / force].
     wear_softness : ndarray (m,)
-        Part of `softness` that is due to wear and stores no energy [length / force].
-    tangential_softness : ndarray (m,)
-        Compliance of each constraint along its tangents [length / force].
+        Part of the compliance along the normal that is due to wear and stores no energy [length / force].
     elastic_slip : ndarray (k, m)
         Minus the elastic slip of the tangential compliance at the beginning of the load step. It is added to the slip of the
         step, so that only the change of the forces in the step causes elastic slip [length].
@@ -256,7 +250,7 @@ class Constraints:
     B: csr_array
     gap0: Array
     positions: Array
-    compliance: MultiplierCompliance | None = None
+    compliance: Compliance | None = None
     tangents: tuple[csr_array, ...] = ()
     directions: tuple[Array, ...] = ()
     friction: Array = field(default_factory=np.empty(0).copy)
@@ -265,7 +259,6 @@ class Constraints:
     softness: Array = field(default_factory=np.empty(0).copy)
     wear_softness: Array = field(default_factory=np.empty(0).copy)
     low_rank_compliance: Array = field(default_factory=np.empty(0).copy)
-    tangential_softness: Array = field(default_factory=np.empty(0).copy)
     elastic_slip: Array = field(default_factory=np.empty(0).copy)
     areas: Array | None = None
     nodes: Indices | None = None
@@ -282,9 +275,10 @@ class Constraints:
     def __post_init__(self) -> None:
         k, m = len(self.tangents), len(self.gap0)
         shapes: dict[str, tuple[int, ...]] = dict.fromkeys(_SCALARS, (m,))
-        shapes |= {"slip0": (k, m), "elastic_slip": (k, m), "low_rank_compliance": (1 + k, m, 0)}
+        shapes |= {"slip0": (k, m), "elastic_slip": (k, m)}
+        shapes |= {"softness": (1 + k, m), "low_rank_compliance": (1 + k, m, 0)}
         for name, shape in shapes.items():
-            if not (values := getattr(self, name)).size:
+            if not (values := getattr(self, name)).any():  # also zeros for another number of tangents
                 object.__setattr__(self, name, np.zeros(shape, values.dtype))
 
     def __len__(self) -> int:
@@ -295,10 +289,29 @@ class Constraints:
         """Constraints (m,) that can close."""
         return np.asarray((np.diff(self.B.indptr) > 0) | self.prescribed)
 
-    @property
-    def normal_compliance(self) -> Compliance | None:
-        """Total compliance along the normals, the sum of C and `softness`; None if it is zero."""
-        return _WithSoftness(self.compliance, self.softness) if self.softness.any() else self.compliance
+    def normal_compliance(self, rows: Indices) -> Array | None:
+        """Return the compliance along the normals of the constraints `rows` (q,), None if all have none [length / force].
+
+        It is the sum (q, q) of C and `softness`, or only the diagonal (q,) without C.
+        """
+        softness = self.softness[0]
+        if self.compliance is None:
+            return softness[rows] if softness.any() else None
+        return np.diag(softness[rows]) + self.compliance.block(rows)
+
+    def normal_compliance_operator(self, rows: Indices) -> Array | FieldCompliance | None:
+        """Return `normal_compliance`, or an equivalent object, see `Compliance.block_operator`."""
+        softness, C = self.softness[0, rows], self.compliance
+        if C is None or not isinstance(operator := C.block_operator(rows), FieldCompliance):
+            return self.normal_compliance(rows)
+        if not softness.any():
+            return operator
+        return operator.softened(softness, lambda: np.diag(softness) + C.block(rows))
+
+    def elastic_gaps(self, multiplier: Array) -> Array:
+        """Return the changes (m,) of the gaps due to the compliance along the normals under multipliers (m,) [length]."""
+        gaps = self.softness[0] * multiplier
+        return gaps if self.compliance is None else gaps + self.compliance.apply(multiplier)
 
     @property
     def coupled(self) -> bool:
@@ -362,7 +375,7 @@ class Constraints:
 
         Elastic slips are the tangential components of the product of compliance and forces.
         """
-        slips = self.tangential_softness * tangential.T
+        slips = self.softness[1:] * tangential.T
         if self.compliance is not None:
             slips += self._products_with_compliance(self.compliance, np.vstack([multiplier, tangential.T]))[1:]
         return np.einsum("km,kmd->md", slips, np.stack(self.directions))
@@ -373,7 +386,7 @@ class Constraints:
         gaps = np.einsum("amh,h->am", Z, np.einsum("amh,am->h", Z, forces))
         return gaps if self.compliance is None else gaps + self._products_with_compliance(self.compliance, forces)
 
-    def _products_with_compliance(self, C: MultiplierCompliance, forces: Array) -> Array:
+    def _products_with_compliance(self, C: Compliance, forces: Array) -> Array:
         """Return the products (1 + k, m) of C and `forces` (1 + k, m) along normals and tangents [length]."""
         axes = self.compliance_axes
         return np.einsum("md,amd->am", C.apply(np.einsum("am,amd->md", forces, axes)), axes)
@@ -426,10 +439,11 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     k, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
     branches = [pair.branches for pair in pairs if pair.branches is not None]
     tangents = [pair.tangents or (csr_array(pair.B.shape),) * k for pair in pairs]
-    names = "gap0", "positions", "friction", "equality", "softness", "tangential_softness"
+    names = "gap0", "positions", "friction", "equality"
     concatenated: dict[str, Any] = {name: np.concatenate([getattr(pair, name) for pair in pairs]) for name in names}
     for name in ("slip0", "elastic_slip"):  # zero for pairs without tangents
         concatenated[name] = np.hstack([np.resize(getattr(pair, name), (k, len(pair))) for pair in pairs])
+    softness = [np.pad(pair.softness, ((0, k - len(pair.tangents)), (0, 0))) for pair in pairs]
     factors = [pair.low_rank_compliance for pair in pairs]  # empty for pairs without tangents
     factors = [np.resize(factor, (1 + k, *factor.shape[1:])) for factor in factors]
     return StackedConstraints(
@@ -437,6 +451,7 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
         compliance=_BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
         tangents=tuple(csr_array(vstack(rows, format="csr")) for rows in zip(*tangents, strict=True)),
         directions=_stacked_directions(pairs),
+        softness=np.hstack(softness),
         low_rank_compliance=np.stack([block_diag(*factor) for factor in zip(*factors, strict=True)]),
         nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
         branches=np.concatenate(branches) if branches else None,
@@ -456,27 +471,6 @@ def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tupl
     k = max(map(len, directions))
     tangents = [t or (np.zeros_like(pair.positions),) * k for t, pair in zip(directions, pairs, strict=True)]
     return tuple(map(np.vstack, zip(*tangents, strict=True)))
-
-
-class _WithSoftness:
-    """The sum of a `compliance` and a diagonal one, `softness` (m,) [length / force]; see `Compliance`."""
-
-    def __init__(self, compliance: Compliance | None, softness: Array) -> None:
-        self._compliance, self._softness = compliance, softness
-
-    def block(self, rows: Indices) -> Array:
-        softness = self._softness[rows]
-        return softness if self._compliance is None else np.diag(softness) + self._compliance.block(rows)
-
-    def block_operator(self, rows: Indices) -> Array | FieldCompliance:
-        operator = None if self._compliance is None else self._compliance.block_operator(rows)
-        if isinstance(operator, FieldCompliance):
-            return operator.softened(self._softness[rows], lambda: self.block(rows))
-        return self.block(rows)
-
-    def apply(self, multiplier: Array) -> Array:
-        diagonal_part = (self._softness * multiplier.T).T
-        return diagonal_part if self._compliance is None else diagonal_part + self._compliance.apply(multiplier)
 
 
 class _BlockDiagonal:

@@ -247,11 +247,12 @@ def with_fluid_pressure(
         share = csr_array((of_total, (np.arange(len(node)), node)), shape=force_by_node.shape)
         B = csr_array(B - share @ facets.by_node(linearised_at, len(nodes)))
         B.eliminate_zeros()
+    soft = distance_to_zero / (config.fluid_pressure * constraints.areas)
     return replace(
         constraints,
         B=B,
         gap0=np.where(rows, -distance_to_zero - B @ config.displacement.ravel(), constraints.gap0),
-        softness=np.where(rows, distance_to_zero / (config.fluid_pressure * constraints.areas), constraints.softness),
+        softness=np.vstack([np.where(rows, soft, constraints.softness[0]), constraints.softness[1:]]),
         equality=constraints.equality | rows,
         friction=np.where(rows, 0.0, constraints.friction),
         wetted=WettedRegion(rows, pressure, csr_array(weights.T @ force_by_node), areas, facets),

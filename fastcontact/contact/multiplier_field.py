@@ -66,7 +66,7 @@ class Projection:
         return (np.diag(inverse) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
 
     def split(self, rows: Indices) -> tuple[Array, csr_array, Array]:
-        """Return d (q,), P (q, k) and S (k, k) of the submatrix ``diag(d) - P S P.T``; see `MultiplierCompliance.split`."""
+        """Return d (q,), P (q, k) and S (k, k) of the submatrix ``diag(d) - P S P.T``; see `Compliance.split`."""
         areas, k = np.where(self.mass is None, 0.0, self.areas[rows]), self.P.shape[1]
         S = np.zeros((k, k)) if self.mass is None else self.mass.solve(np.eye(k)) / self.rho
         d = np.divide(1.0, self.rho * areas, out=np.zeros_like(areas), where=areas > 0)

@@ -50,8 +50,7 @@ class WearCompliance:
         dry = areas > 0.0 if constraints.wetted is None else (areas > 0.0) & ~constraints.wetted.rows
         slope = np.where(dry, self.slope[nearest(self.nodes, constraints.positions)[1]], 0.0)
         pressure = self.pressure[nearest(self.positions, constraints.positions)[1]]
-        softness = np.divide(slope, areas, out=np.zeros_like(slope), where=dry)
-        return replace(
-            constraints, gap0=constraints.gap0 - slope * pressure, softness=constraints.softness + softness,
-            wear_softness=softness,
-        )  # fmt: skip
+        softness, of_wear = constraints.softness.copy(), np.divide(slope, areas, out=np.zeros_like(slope), where=dry)
+        softness[0] += of_wear
+        gap0 = constraints.gap0 - slope * pressure
+        return replace(constraints, gap0=gap0, softness=softness, wear_softness=of_wear)

@@ -169,4 +169,4 @@ def with_compliance(F: Delassus, constraints: Constraints, rows: Indices, compon
             F.S[:] += constraints.compliance.block(rows)[np.ix_(number, number)] * (frame @ frame.T)
         if Z.size:
             F.S[:] += Z @ Z.T
-    return replace(F, d=F.d + np.append(constraints.softness[rows], np.zeros(len(F.d) - len(rows))))
+    return replace(F, d=F.d + np.append(constraints.softness[0, rows], np.zeros(len(F.d) - len(rows))))

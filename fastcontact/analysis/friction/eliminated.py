@@ -52,8 +52,8 @@ def solve(
     loaded : LoadedNonsymmetric
         Prepared matrix K (n, n) with a right-hand side.
     constraints : Constraints
-        The m constraints in the n unknowns, see `friction.solve.solve`. The only compliances allowed are the diagonal ones,
-        `softness` and `tangential_softness`.
+        The m constraints in the n unknowns, see `friction.solve.solve`. The only compliance allowed is the diagonal one,
+        `softness`.
     closed : ndarray of bool (m,)
         Constraints that are assumed closed and sticking at the start, if there are no initial `forces`.
     accuracy : Accuracy
@@ -120,7 +120,7 @@ class Eliminated:
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
         unknown_compliance = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
-        self._compliance = diagonal_compliance(constraints)
+        self._compliance = constraints.softness.copy()
         compliance = self._compliance_of_rows(rows, unknown_compliance)
         self._rotation = cone_newton.aligning_rotation(compliance, constraints.directions) if k == 2 else None
         if self._rotation is not None:
@@ -238,11 +238,6 @@ class Eliminated:
             return FrictionTerms(force_rows)
         springs = sliding.springs
         return FrictionTerms(force_rows, springs, -springs.rows.T @ (springs.stiffness * sliding.free))
-
-
-def diagonal_compliance(constraints: Constraints) -> Array:
-    """Return the diagonal compliance (1 + k, m) of constraints, along normals and then each tangent [length / force]."""
-    return np.stack([constraints.softness, *[constraints.tangential_softness] * len(constraints.tangents)])
 
 
 @record

@@ -117,7 +117,7 @@ def _eliminated(
             y, closing = path.along(constraints.directions, all_rows)
             u_end = loaded.full_solution(constraints.force(y[0], y[1:].T))
             at_end = np.stack([R @ u_end for R in (constraints.B, *constraints.tangents)])
-            initial_offset = -constraints.gaps_at_rest() - at_end - eliminated.diagonal_compliance(constraints) * y
+            initial_offset = -constraints.gaps_at_rest() - at_end - constraints.softness * y
             initial_offset[0] += path.gap
             initial_offset = np.where(usable, initial_offset, 0.0)
             distance = 4.0 * largest(initial_offset[0])  # further than constraints can close
@@ -262,11 +262,11 @@ def _included_problem(
     free, F = delassus.of_rows(loaded, R, factored)
     number = numbers_at(components, (1 + k, q))
     # This compliance is added before held tangents are detected, since compliant tangents are not held.
-    F = replace(F, d=F.d + np.append(np.zeros(q), np.tile(constraints.tangential_softness[rows], k))[components])
+    F = replace(F, d=F.d + np.append(np.zeros(q), constraints.softness[1:, rows])[components])
     Q = aligning_rotation(F.diagonal_blocks(number)) if k == 2 else None
     Q_F = None if Q is None else csr_array(Q[components][:, components])
     C = F.rotated(Q_F).diagonal_blocks(number)
-    C[0, 0] += np.where(constraints.prescribed, constraints.softness, 0.0)[rows]
+    C[0, 0] += np.where(constraints.prescribed, constraints.softness[0], 0.0)[rows]
     held_slips = held_tangents(C) & (number[1:] >= 0)
     F = delassus.with_compliance(F, constraints, rows, components)
     if not factored:

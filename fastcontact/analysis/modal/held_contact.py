@@ -147,12 +147,12 @@ def _conditions(
         sticking = (contact.active & (contact.sticking | hold_sliding))[side_rows] & frictional
     closed_rows, sticking_rows = np.flatnonzero(closed), np.flatnonzero(sticking)
     weights = csr_array(moments[closed_rows])
-    compliance = _compliance(weights, constraints.softness)
+    compliance = _compliance(weights, constraints.softness[0])
     yield Conditions(csr_array(weights @ constraints.B), nodes[closed_rows], areas[closed_rows], compliance=compliance)
     if constraints.tangents:
         weights = csr_array(moments[sticking_rows])
         rows = [weights @ T for T in constraints.tangents]
-        compliance = _compliance(weights, constraints.tangential_softness)
+        compliance = _compliance(weights, constraints.softness[1])
         yield _tangential_conditions(directions, rows, sticking_rows, nodes, areas, compliance)
 
 

@@ -91,8 +91,7 @@ class Adjoint:
             constraints = contact.constraints
             self._B = csr_array(constraints.B[contact.active])
             self._rows = self._system.rows(self._B, np.zeros(k), np.zeros(n))[0]
-            compliance = constraints.normal_compliance
-            self._C = None if compliance is None else compliance.block(contact.active)
+            self._C = constraints.normal_compliance(contact.active)
         self._w, self._mu = self._solve()
 
     def derivatives(self, changes: Sequence[Change]) -> Array:

@@ -95,9 +95,7 @@ class MovingContact:
                 f"contact has {len(multiplier)} constraints, but {len(constraints)} if nodes move: nodes of both sides "
                 f"coincide, and the one-sided derivatives differ there. {OPPOSITE_NODES}"
             )
-        gap = constraints.gap0 + constraints.B @ self.u
-        if constraints.normal_compliance is not None:
-            gap = gap + constraints.normal_compliance.apply(multiplier)
+        gap = constraints.gap0 + constraints.B @ self.u + constraints.elastic_gaps(multiplier)
         pressure = self.pressure(multiplier, constraints)
         return np.concatenate([constraints.force(multiplier), gap[self.active], pressure])
 

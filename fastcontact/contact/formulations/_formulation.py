@@ -171,14 +171,16 @@ class Formulation(ContactSides, ABC):
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
         if areas is None:
             raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
+        softness = np.zeros_like(constraints.softness)
         if isinstance(normal, OverclosureLaw):
             slope, zero = normal.tangent(-constraints.gaps(config.displacement))
-            constraints = replace(constraints, gap0=constraints.gap0 + zero, softness=1.0 / (slope * areas), law=normal)
+            constraints = replace(constraints, gap0=constraints.gap0 + zero, law=normal)
+            softness[0] = 1.0 / (slope * areas)
         elif normal is not None:
-            constraints = replace(constraints, softness=np.asarray(1.0 / (normal * areas)))
-        if tangential is None or not constraints.tangents:
-            return constraints
-        return replace(constraints, tangential_softness=1.0 / (tangential(constraints.positions) * areas))
+            softness[0] = 1.0 / (normal * areas)
+        if tangential is not None:
+            softness[1:] = 1.0 / (tangential(constraints.positions) * areas)
+        return replace(constraints, softness=softness)
 
     @cached_property
     def _initial_gaps(self) -> tuple[Array, Array]:

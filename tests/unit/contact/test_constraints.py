@@ -36,7 +36,7 @@ def parts():
     return [
         part(2, 1, equality=np.array([True, False])),
         part(3, 2, True, 2, friction=np.full(3, 0.3), low_rank_compliance=random.normal(size=(3, 3, 2))),
-        part(4, 3, softness=np.full(4, 0.1)),
+        part(4, 3, softness=np.full((1, 4), 0.1)),
         part(2, 4, True, 2, slip0=random.normal(size=(2, 2)), low_rank_compliance=random.normal(size=(3, 2, 1))),
     ]
 
@@ -57,7 +57,7 @@ def test_rows_and_numbers_follow_each_other(parts):
     np.testing.assert_array_equal(whole.gap0, np.concatenate([p.gap0 for p in parts]))
     assert whole.friction.tolist() == [0.0] * 2 + [0.3] * 3 + [0.0] * 6
     assert whole.equality.tolist() == [True] + [False] * 10
-    assert whole.softness.tolist() == [0.0] * 5 + [0.1] * 4 + [0.0] * 2
+    assert whole.softness.tolist() == [[0.0] * 5 + [0.1] * 4 + [0.0] * 2] + [[0.0] * 11] * 2
     np.testing.assert_array_equal(whole.slip0[:, 9:], parts[3].slip0)
     assert not whole.slip0[:, :9].any()
     for k in range(2):
@@ -75,7 +75,7 @@ def test_what_no_part_has_the_whole_has_not():
     assert whole.compliance is None
     assert whole.tangents == whole.directions == ()
     assert not whole.low_rank_compliance.size
-    assert not np.concatenate([whole.slip0.ravel(), whole.equality, whole.friction, whole.softness]).any()
+    assert not np.concatenate([whole.slip0.ravel(), whole.equality, whole.friction, whole.softness.ravel()]).any()
 
 
 def test_compliances_do_not_couple_parts(parts):
@@ -86,9 +86,9 @@ def test_compliances_do_not_couple_parts(parts):
     np.testing.assert_array_equal(whole.compliance.block(rows), C[np.ix_(rows, rows)])
     multiplier = np.arange(11.0)
     np.testing.assert_allclose(whole.compliance.apply(multiplier), C @ multiplier, rtol=1e-14)
-    soft = C + np.diag(whole.softness)
-    np.testing.assert_array_equal(whole.normal_compliance.block(rows), soft[np.ix_(rows, rows)])
-    np.testing.assert_allclose(whole.normal_compliance.apply(multiplier), soft @ multiplier, rtol=1e-14)
+    soft = C + np.diag(whole.softness[0])
+    np.testing.assert_array_equal(whole.normal_compliance(rows), soft[np.ix_(rows, rows)])
+    np.testing.assert_allclose(whole.elastic_gaps(multiplier), soft @ multiplier, rtol=1e-14)
 
 
 def test_factors_of_compliances_lie_side_by_side(parts):
