@@ -154,8 +154,8 @@ class ContactSides:
         It is the negative of the motion of a rigid primary side in the step. Between two bodies, if `slip` is
         ``"symmetric"``, it is the negative of the tangential displacement that closes the gap. On curved surfaces, in
         particular at the edge of the contact, the normal of the primary side is inclined to the direction in which the gap
-        closes. A component of this motion would then count as slip. The gap is assumed to close along the mean of the normals
-        of both sides, which is exact for two bodies that are mirror images. `directions` are k unit tangents (n, dim).
+        closes. A component of the closing motion would then count as slip. The gap is assumed to close along the mean normal
+        of the two sides, which is exact for two bodies that are mirror images. `directions` are k unit tangents (n, dim).
         """
         if isinstance(self.primary, RigidSide):
             obstacle_motion = self.rigid_motion(candidates.positions, config)

@@ -22,9 +22,9 @@ def planes(corners, n_corners, origin, axes):
         _plane(corners[i], n_corners, origin[i], axes[i])
 
 
-# This function is inlined. Of a separate kernel, the process that compiles it and later processes, which load it from the
-# cache, would run different copies, in which products and sums may be fused differently. Tangents that differ in the last
-# bit would change all contact results.
+# This function is inlined. If it were a separate kernel, the process that compiles it and later processes that load it from
+# the cache would run different copies, in which products and sums may be fused differently. Tangents that differ in the
+# last bit would change all contact results.
 @innermost_kernel
 def _plane(corners, count, origin, axes):
     origin[:] = 0.0

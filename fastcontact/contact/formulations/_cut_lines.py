@@ -127,9 +127,9 @@ def opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) ->
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:
-    """Return the zeros of fields inside lines of two or three nodes.
+    """Return the zeros of n fields inside lines of two or three nodes, as numbers of fields and reference coordinates.
 
-    They are given by rows of the nodal `values` (n, k), and reference coordinates.
+    `values` (n, k) are the values of the fields at the nodes.
     """
     a, b = values[:, 0], values[:, 1]
     slope, middle = 0.5 * (b - a), 0.5 * (a + b) if values.shape[1] == 2 else values[:, 2]
@@ -140,8 +140,8 @@ def _zeros(values: Array) -> tuple[Indices, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         roots = np.stack([q / half_curvature, middle / q], axis=1)
     roots[slope**2 < 4.0 * half_curvature * middle] = np.nan
-    row, number = np.nonzero(np.abs(roots) < 1.0 - LENGTH_ROUND_OFF)
-    return row, roots[row, number]
+    field, number = np.nonzero(np.abs(roots) < 1.0 - LENGTH_ROUND_OFF)
+    return field, roots[field, number]
 
 
 def line_overlap(

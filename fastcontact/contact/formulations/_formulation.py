@@ -82,8 +82,8 @@ class Formulation(ContactSides, ABC):
     allows_obstacles: ClassVar[bool] = True
     # Whether each node has one gap, which is weighted over the adjacent facets.
     weighs_gaps: ClassVar[bool] = False
-    # Whether gaps between bodies are linearised at the mean of the displacements at which the sides were paired and of the
-    # solution, which reduces the error of a Newton step. Otherwise, they are linearised at the former.
+    # Whether gaps between bodies are linearised at the mean of the displacements of the pairing and of the solution, which
+    # reduces the error of a Newton step, instead of at the displacements of the pairing.
     linearised_at_mean: ClassVar[bool] = False
 
     @property

@@ -56,7 +56,7 @@ class NodeToSegment(Formulation):
         if self.opposite == "node" and not isinstance(self.primary, Surface):
             raise ContactError("a rigid obstacle has no nodes: leave out opposite = 'node'")
         for block in self.secondary.blocks:
-            # A uniform pressure on a facet must have compressive forces at all nodes.
+            # The equivalent nodal forces of a uniform pressure must be compressive at all nodes of a facet.
             if not all_nodes_carry_pressure(block.element):
                 primary_blocks = self.primary.blocks if isinstance(self.primary, Surface) else ()
                 can_swap = primary_blocks and all(all_nodes_carry_pressure(b.element) for b in primary_blocks)
