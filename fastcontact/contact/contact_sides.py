@@ -224,8 +224,8 @@ class ContactSides:
             axes = smoothing.frames(self.points + config.displacement)
             factor = smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
             slope = factor * smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
-            if pairing.beyond is not None:  # The extensions of facets are straight.
-                slope = np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
+            if pairing.overhang_xi is not None:  # The extensions of facets are straight.
+                slope = np.where(pairing.overhang_xi[rows] == 0.0, slope, 0.0)
         return SurfacePoints(candidates, pairing, rows, primary, normals, closest, slope)
 
     def rigid_motion(self, positions: Callable[[Array], Array], config: Configuration) -> Array:

@@ -23,7 +23,7 @@ from fastcontact.elasticity.constitutive_kernels import (
     sum_products,
     voigt,
 )
-from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
+from fastcontact.elasticity.dilatation_kernels import back_substitute, forward_substitute
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, find_owned
 from fastcontact.elasticity.element_3d_kernels import add_block
 from fastcontact.elasticity.tile_product import tile
@@ -212,7 +212,7 @@ def _elastic_tangent(constants, D, bulk, plane_stress):
     """Return A (24, 12) for elastic small strains, without the projected dilatation."""
     no_history, new, P, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.zeros((24, 12))
     F, G = np.zeros((3, 3)), np.empty((3, 3))
-    finite, tangent, geometric = np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
+    finite, tangent, geometric = np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see `_solve_plane_stress`
     dilatation = _dilatation(F, finite, G)
     _evaluate_point(
         constants, D, bulk, 0.0, 0.0, plane_stress, finite, geometric, tangent, F, dilatation, G, no_history, new, P, elastic
@@ -268,7 +268,7 @@ def _project(polynomials, volume, gradient, dim, dilatation, G, factors, mass, p
             _weigh(G, 3 * q, weight, dim, factors, 3 * q)
         if len(slopes):
             _integrate(factors, gradient, slopes, 4 * k)
-    reduce(mass, projected)
+    forward_substitute(mass, projected)
     for k in range(m if len(slopes) else 0):
         for n in range(k):
             for i in range(4):

@@ -464,7 +464,7 @@ def _second_invariant(C01, I1, scale, F, J, G, factor, d2J_factor, tangent, P, A
 
 @kernel
 def _ogden(constants, F, tangent, P, A):
-    """Apply Ogden's law of the isochoric stretches; return the energy density.
+    """Apply Ogden's law of the isochoric principal stretches; return the energy density.
 
     The energy is the sum of 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) (Ogden, 1972); the moduli in principal axes
     are those of Simo and Taylor (1991, equation 2.28).

@@ -26,7 +26,10 @@ def _gather(values, cells, c, x):
 
 @kernel
 def map_3d(x, slopes, q, gradient):
-    """Fill `gradient` (3, n_nodes) with shape derivatives in x, y, z; return det J."""
+    """Fill `gradient` (3, n_nodes) with shape derivatives in x, y, z at point q; return det J.
+
+    `x` (3, n_nodes) are the positions of the nodes, and `slopes` (n_q, 3, n_nodes) the derivatives dN, see `transposed`.
+    """
     j00, j01, j02, j10, j11, j12, j20, j21, j22 = jacobian_3d(x, slopes, q)
     c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
     det = j00 * c00 + j01 * c01 + j02 * c02

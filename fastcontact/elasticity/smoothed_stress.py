@@ -61,7 +61,7 @@ def smoothed_stress(mesh: Mesh, field: MaterialField, stress: CellStress | Point
     """
     components = field.moduli.shape[1]
     at_nodes = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
-    material = field.distinct
+    material = field.distinct_materials
     for number in np.unique(np.concatenate([*material.values()])):
         average = NodalAverage(mesh.n_points, components)
         rows_of_material = {name: np.flatnonzero(material[name] == number) for name in at_nodes}

@@ -77,7 +77,7 @@ class NodeToSegment(Formulation):
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
             normal = config.deformed(self.primary, self.points).nodal_normals[closest]
-        return replace(pairing, facet=nodes.facet[closest], xi=nodes.xi[closest], normal=normal, beyond=None)
+        return replace(pairing, facet=nodes.facet[closest], xi=nodes.xi[closest], normal=normal, overhang_xi=None)
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
