@@ -236,7 +236,8 @@ def _middle_in_2d(
     """Return the middle on a surface in a plane model.
 
     A surface in several pieces is projected along its mean normal. The positions `points` (n_nodes, 2) of the nodes differ
-    from their `coordinates` [length] if the contact has `crossed` periodic ends, see `ContactMiddle.periods`.
+    from their `coordinates` [length] if the contact has `crossed` periodic ends, see `ContactMiddle.periods`. For the other
+    parameters, see `_middle_in_3d`.
     """
     length = float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)

@@ -240,8 +240,8 @@ class LinearisedPoints:
     tests : csr_array (m, n), optional
         Weights of the points in the mean normals, if the normals of the constraints are such means.
     separate_normals : DeformedSide or Points, optional
-        The secondary side, or points whose normals are those of the constraints, if the latter are neither
-        means over the integration points nor the normals of these points.
+        The secondary side, or other points, from which the normals of the constraints are taken, if these normals are neither
+        means over the integration points nor the normals at these points.
     slips : Slips, optional
         Slips of the constraints; None without tangential constraints.
     rows_in_pair : (ndarray of int (m,), int), optional

@@ -178,8 +178,8 @@ def pair(
     primary : DeformedSide or RigidSide
     projection_tolerance : float
         Largest overhang beyond the end of the primary surface at which a candidate is paired, in facet lengths [-]
-        (TOLE_PROJ_EXT of code_aster). It then faces the straight extension of the facet, so that the forces on both
-        sides have the same line of action, and their moments are in equilibrium.
+        (TOLE_PROJ_EXT of code_aster). An overhanging candidate faces the straight extension of the facet, so that the
+        forces on both sides have the same line of action, and their moments are in equilibrium.
     normals : str or sequence of float
         ``"facet"`` for the normals of facets, a unit vector (dim,) for this normal everywhere, or any other string for
         normals interpolated between averaged nodal normals, which are continuous except at corners. Unless they are

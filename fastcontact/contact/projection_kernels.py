@@ -75,7 +75,8 @@ def _interpolated(coefficients, f, s, t):
 def _newton(point, positions, directions, f, s, t, height):
     """Return the solution (s, t) of ``X(s, t) + height n(s, t) = point`` on the extended facet `f`, and whether it converged.
 
-    X is the position and n the interpolated normal. The arguments (s, t) and `height` are the initial guess.
+    X is the position and n the interpolated normal, with the coefficients `positions` and `directions`, see `along_normals`.
+    The arguments (s, t) and `height` are the initial guess.
     """
     step = np.inf
     for _ in range(MAX_ITERATIONS):
@@ -101,14 +102,14 @@ def _newton(point, positions, directions, f, s, t, height):
 
 @innermost_kernel
 def overhang_of(triangle, s, t):
-    """Return how far reference coordinates lie outside a facet, in facet lengths; 0 inside."""
+    """Return how far reference coordinates lie outside a facet, a `triangle` or a quadrangle, in facet lengths; 0 inside."""
     outside = max(-s, -t, s + t - 1.0) if triangle else 0.5 * (max(abs(s), abs(t)) - 1.0)
     return max(outside, 0.0)
 
 
 @innermost_kernel
 def clamped(triangle, s, t):
-    """Return reference coordinates moved into a facet, independently of the choice of its first corner."""
+    """Return reference coordinates moved into a `triangle` or quadrangle, independently of the choice of a first corner."""
     if triangle:
         a, b, c = max(s, 0.0), max(t, 0.0), max(1.0 - s - t, 0.0)
         total = a + b + c if min(s, t, 1.0 - s - t) < 0.0 else 1.0
@@ -136,7 +137,7 @@ def _distance_beyond(positions, triangle, f, s, t, length):
 def _closest_neighbour(point, positions, directions, triangular, neighbours, f, height, length):
     """Return the neighbour of facet `f` with the smallest `_distance_beyond`, (s, t) of the projection, and this distance.
 
-    The distance is infinite if no projection converges.
+    The distance is infinite if no projection converges. For the arguments, see `along_normals` and `_distance_beyond`.
     """
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf

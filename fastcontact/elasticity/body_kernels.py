@@ -6,6 +6,9 @@ consists of integrals of dN/dX . A . dN/dX (Bonet and Wood, 2008, chapter 9). At
 is the trace of the strain, and F denotes the displacement gradient, because the differences F - I and J - 1 would add
 round-off to small strains. With thermal expansion, F is the elastic part of the deformation gradient, relative to the
 stress-free intermediate configuration (Lu and Pister, 1975).
+
+Shared arguments: ``finite`` states whether strains are finite; ``bulk`` is a bulk modulus [pressure]. ``constants``, D, F, P,
+A, ``old`` and ``new`` are described in `constitutive_kernels`, ``slots``, ``owner`` and ``part`` in `element_2d_kernels`.
 """
 
 import numpy as np

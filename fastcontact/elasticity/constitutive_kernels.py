@@ -9,7 +9,7 @@ variables at the beginning and the end of the load step: the plastic strain (xx,
 components), the equivalent plastic strain, the plastic work [energy / volume], and in plane stress F_zz - 1. At finite
 strains, L - I takes the place of the plastic strain, where L is the lower triangular factor of the inverse plastic metric,
 C_p^-1 = L L^T. For laws that have a bulk modulus, `evaluate_law` adds the volumetric part of P and A, and the element loop
-adds that of the energy, U(J) = K (J - 1)^2 / 2.
+adds that of the energy, U(J) = K (J - 1)^2 / 2. ``tangent`` states whether A is computed.
 """
 
 import numpy as np

@@ -4,7 +4,8 @@
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
 (xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect, and are arguments because the
-loops of both dimensions are called in the same way.
+loops of both dimensions are called in the same way. In helpers, ``slots`` and ``in_part`` are those of `add_stiffness` and
+`find_owned`, and ``flat`` is the matrix ``data`` as a vector.
 """
 
 import numpy as np

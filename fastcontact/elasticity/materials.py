@@ -234,8 +234,8 @@ class Material:
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the strain (n, 4), in 3D (n, 6) [1 / temperature] per unit temperature rise at `points` (n, dim) [length].
 
-        It is NaN without a coefficient of thermal expansion. Raises ModelError if it has an out-of-plane shear component,
-        which plane kinematics exclude.
+        The strain is NaN without a coefficient of thermal expansion. Raises ModelError if it has an out-of-plane shear
+        component, which plane kinematics exclude.
         """
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:

@@ -110,7 +110,7 @@ class NonlinearBodies:
     def halving_estimates_error(self) -> bool:
         """Whether `change_if_halved` estimates the error of the plastic flow.
 
-        It does not do so in plane stress, where the out-of-plane strain changes the strain path when yielding begins.
+        There is no such estimate in plane stress, where the out-of-plane strain changes the strain path when yielding begins.
         """
         return self.yields and self.kinematics != "plane_stress"
 
@@ -166,8 +166,8 @@ class NonlinearBodies:
             `body_kernels.linearise`. With 0, the tangent is positive definite farther from the solution, and also if the
             rotation of a loaded body is prevented by contact alone.
         tangent : bool
-            Whether K is computed at once. Otherwise, it is computed when it is first used. This halves the time if K is not
-            used, and increases it by half if K is used.
+            Whether K is computed at once. Otherwise, it is computed when it is first used, which halves the time if K is not
+            used, and increases it by half if it is.
 
         Raises
         ------

@@ -83,7 +83,7 @@ class FixedTemperature(TemporaryHeat):
             )
 
     def history(self) -> tuple[Table | None, Table]:
-        """Return the ramps of the rises of `value` and `reached`; the latter is zero from the next point of `ramp` on."""
+        """Return the ramps of the rises of `value` and `reached`; that of `reached` falls to zero at the next ramp point."""
         later = [point for point in self.ramp or () if point[0] > self.begins]
         if self.reached is None or not later:
             return self.ramp, ()

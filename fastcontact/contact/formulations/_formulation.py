@@ -206,7 +206,10 @@ class Formulation(ContactSides, ABC):
         return tied_constraints(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
-        """Return the `tied.reduction` of the multipliers of a tied pair; None if supports hold both sides at no node."""
+        """Return the `tied.reduction` of the multipliers of a tied pair; None if supports hold both sides at no node.
+
+        `moments` and `areas` are the results of `tied.moments_of`.
+        """
         # Directions in which all nodes of a facet are held are ignored.
         held = held_on_both_sides(self, Configuration.undeformed(self.points))
         held = without_complete_facets(held, self.secondary)

@@ -416,9 +416,9 @@ class WeightedMortar(Formulation):
         return tuple(rows), substitutions
 
     def _weighted_integrals(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
-        """Return the mortar matrices D and M (m, n_points) [area], and the integrals of the gap reductions.
+        """Return the mortar matrices D and M (m, n_points) [area], and the weighted gap reductions (m, dim) [volume].
 
-        The latter are the integrals (m, dim) of psi times the vectors of `Overlap.gap_reductions` [volume].
+        The weighted gap reductions are the integrals of psi times the vectors of `Overlap.gap_reductions`.
         """
         overlap = coverage.overlap
         size = (len(self.secondary.points), len(self.points))

@@ -168,7 +168,7 @@ class Continuous(PressureFieldFormulation):
         return areas.ravel()
 
     def _independent_values(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
-        """Return the map (n_nodes, k) from independent to nodal values of the field, and the nodes (k,) of the former.
+        """Return the map (n_nodes, k) from the independent values of the field to all nodal values, and their nodes (k,).
 
         All nodal values are independent, except at nodes without area, at excluded nodes, and with friction at ends of
         quadratic lines on the axis, see `integration.even_at_axis`. Without friction, the value on the axis is independent,

@@ -79,7 +79,7 @@ class CompleteFacets:
     def degrees(self, mass: Array) -> Indices:
         """Return the degree (n_facets,) of the field that the covered part of each facet determines.
 
-        It is 2 for the field of the shape functions, 1 for a field that is linear between the corners, 0 if neither is
+        The degree is 2 for the field of the shape functions, 1 for a field linear between the corners, 0 if neither is
         determined, and -1 if no part of the facet is covered. `mass` (n_facets, k, k) are the integrals over the covered part
         [area].
         """

@@ -42,7 +42,7 @@ class NodeToSegment(Formulation):
     ----------
     opposite : str
         ``"facet"`` to measure the gap to the opposite primary facet, or ``"node"`` to measure it to the nearest primary node.
-        The latter suits matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
+        ``"node"`` suits matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
     """
 
     opposite: str = "facet"

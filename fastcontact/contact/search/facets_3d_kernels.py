@@ -87,7 +87,8 @@ def _convexity(p, q, turn, second, diagonal):
     """Return the squared distance from a facet, with tangents p and q, up to which its minimum on the facet is unique.
 
     The Hessian of half the squared distance is J^T J - r . X'' with the tangents J. It is positive definite where the
-    smallest singular value of J, squared, exceeds r |X''|, with r the distance to the farthest point of the facet.
+    smallest singular value of J, squared, exceeds r |X''|, with r the distance to the farthest point of the facet. `turn` and
+    `second` are results of `_curvature`, and `diagonal` is that of the box of the facet [length].
     """
     pp, pq, qq = dot(p, p), dot(p, q), dot(q, q)
     least = np.sqrt(max(0.5 * (pp + qq) - np.sqrt(0.25 * ((pp - qq) * (pp - qq)) + pq * pq), 0.0)) - turn

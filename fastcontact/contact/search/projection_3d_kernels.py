@@ -105,7 +105,7 @@ def _expansion(coefficients, f, s, t, point):
 
 @kernel
 def _is_feasible(sides, s, t, ps, pt, size):
-    """Return whether a step (ps, pt) from (s, t) stays in the domain at all sides on which (s, t) lies."""
+    """Return whether a step (ps, pt) of length `size` from (s, t) stays in the domain at all sides on which (s, t) lies."""
     for k in range(sides.shape[0]):
         on_side = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ROUND_OFF
         if on_side and sides[k, 0] * ps + sides[k, 1] * pt > 1e-14 * size:
@@ -155,7 +155,8 @@ def _newton_step(sides, s, t, gs, gt, hss, hst, htt):
 def _downhill(coefficients, f, s, t, sides, point, value, hss, hst, htt):
     """Return a step that decreases the distance from a stationary point (s, t); zeros if the point is a minimum.
 
-    Candidates are the direction of the smallest curvature of the Hessian, and those along the sides.
+    Candidates are the direction of the smallest curvature of the Hessian, and those along the sides. `value` is half the
+    squared distance at (s, t).
     """
     middle, radius = 0.5 * (hss + htt), np.sqrt(0.25 * ((hss - htt) * (hss - htt)) + hst * hst)
     if middle - radius >= -1e-9 * (abs(middle) + radius):

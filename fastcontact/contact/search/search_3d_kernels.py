@@ -14,9 +14,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 def closest_facets(points, order, begin, end, facets, domain, numbers, tree, result):
     """Project points (n, 3) onto their closest facets.
 
-    If several facets meet at the closest point, the one with the lowest number is chosen. The arguments are those of
-    `search_2d_kernels.closest_facets`. If a projection fails, the distance is NaN. If a point is not finite, the facet is -1
-    as well.
+    If several facets meet at the closest point, the one with the lowest number is chosen. `facets` and `domain` are described
+    in `projection_3d_kernels`, and the other arguments in `search_2d_kernels.closest_facets`. If a projection fails, the
+    distance is NaN. If a point is not finite, the facet is -1 as well.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     centre = facets.centre[0], facets.centre[1], facets.centre[2]

@@ -141,7 +141,10 @@ def on_bilinear(r, a, b, c, reach):
 
 @kernel
 def _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t):
-    """Return the point that Newton's method reaches from (s, t), and whether it is a stationary point inside the facet."""
+    """Return the point that Newton's method reaches from (s, t), and whether it is a stationary point inside the facet.
+
+    The other arguments are scalar products of the vectors of `on_bilinear`.
+    """
     for _ in range(8):
         if not (abs(s) < 1.0 - ROUND_OFF and abs(t) < 1.0 - ROUND_OFF):
             return s, t, False

@@ -148,7 +148,7 @@ class Element:
 def quadratic(name: str, linear: Element, functions: Functions, **arguments: Any) -> Element:
     """Return a quadratic element, whose facets are those of the `linear` element with their mid-side and centre nodes.
 
-    `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions, and `arguments` are further arguments of
+    `functions` contains its nodes (n_nodes, dim) [-] and its shape functions, and `arguments` are further arguments of
     `Element`.
     """
     nodes, shape = functions
