@@ -155,7 +155,5 @@ def heat_transfer(
     weights = sum(diags_array(scale[:, axis]) @ components[axis] for axis in range(dim))
     assert constraints.areas is not None
     is_facing = np.isfinite(constraints.areas) & (square > 0.0)
-    secondary_weights = csr_array(weights @ diags_array(on_secondary.astype(float)))
-    return HeatTransfer(
-        secondary_weights, csr_array(secondary_weights - weights), np.where(is_facing, constraints.areas, 0.0)
-    )
+    of_secondary = csr_array(weights @ diags_array(on_secondary.astype(float)))
+    return HeatTransfer(of_secondary, csr_array(of_secondary - weights), np.where(is_facing, constraints.areas, 0.0))

@@ -117,10 +117,9 @@ def even_at_axis(surface: Surface, points: Array) -> csr_array:
         on_axis = radii <= SINGLE_PRECISION * np.abs(points).max()  # as in `symmetry_axis.axis_nodes`
         for facet, end in zip(*np.nonzero(on_axis[:, :2]), strict=True) if block.element == "line3" else ():
             nodes = block.local[facet]
-            squared_r1, squared_r2 = radii[facet, [2, 1 - end]] ** 2
+            r1_squared, r2_squared = radii[facet, [2, 1 - end]] ** 2
             values[nodes[end], nodes[end]] = 0.0
-            weights = np.array([squared_r2, -squared_r1]) / (squared_r2 - squared_r1)
-            values[nodes[end], nodes[[2, 1 - end]]] = weights
+            values[nodes[end], nodes[[2, 1 - end]]] = np.array([r2_squared, -r1_squared]) / (r2_squared - r1_squared)
     return csr_array(values)
 
 

@@ -45,7 +45,7 @@ ROUNDED_FRACTION = 0.1
 # direction.
 FACING = 0.1
 Normals: TypeAlias = str | Sequence[float]
-KINDS_OF_NORMALS = ("facet", "averaged", "secondary")
+NORMAL_KINDS = ("facet", "averaged", "secondary")
 
 
 @record
@@ -362,7 +362,7 @@ def relative_motion(candidates: Candidates, pairing: Pairing, n_points: int) -> 
 
 
 def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSide) -> str | tuple[float, ...]:
-    """Return one of KINDS_OF_NORMALS, or a unit vector (dim,); `points` (n_points, dim) are reference coordinates [length].
+    """Return one of NORMAL_KINDS, or a unit vector (dim,); `points` (n_points, dim) are reference coordinates [length].
 
     Raises
     ------
@@ -372,14 +372,14 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     """
     dim = points.shape[1]
     if isinstance(normals, str):
-        if normals not in KINDS_OF_NORMALS:
-            raise ContactError(unknown("kind of normals", normals, [*KINDS_OF_NORMALS, "a vector"]))
+        if normals not in NORMAL_KINDS:
+            raise ContactError(unknown("kind of normals", normals, [*NORMAL_KINDS, "a vector"]))
         result: str | tuple[float, ...] = normals
     else:
         vector = np.asarray(normals, float)
         length = np.linalg.norm(vector)
         if vector.shape != (dim,) or not (np.isfinite(length) and length > 0):
-            kinds = ", ".join(KINDS_OF_NORMALS)
+            kinds = ", ".join(NORMAL_KINDS)
             raise ContactError(f"normals = {normals!r} must be one of {kinds}, or a vector of {dim} numbers")
         result = tuple((vector / length).tolist())
         if (

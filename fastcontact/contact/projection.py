@@ -364,7 +364,7 @@ def _polynomials(blocks: Sequence[Array]) -> Array:
 
     out, first = np.empty((sum(map(len, blocks)), max(vectors.shape[1] for vectors in blocks), 3)), 0
     for vectors in blocks:
-        projection_kernels.fill_coefficients(vectors, tables(vectors.shape[1]).to_terms, first, 0, len(vectors), out)
+        projection_kernels.coefficients(vectors, tables(vectors.shape[1]).to_terms, first, 0, len(vectors), out)
         first += len(vectors)
     return out
 

@@ -46,7 +46,7 @@ def angles(nodes, n_corners, out):
 
 
 @interpretable_kernel
-def fill_coefficients(values, to_terms, first, begin, end, out):
+def coefficients(values, to_terms, first, begin, end, out):
     """Fill rows ``first + begin`` to ``first + end - 1`` of `out` (n_facets, width, 3) with polynomial coefficients.
 
     They interpolate the `values` (n, m, 3) at the nodes of the facets `begin` to ``end - 1``.
@@ -63,11 +63,11 @@ def fill_coefficients(values, to_terms, first, begin, end, out):
 
 
 @innermost_kernel
-def _interpolated(coefficients, f, s, t):
-    """Return the value of the polynomials of facet `f` at (s, t), and their derivatives."""
-    x, xs, xt, _, _, _ = component(coefficients, f, 0, s, t)
-    y, ys, yt, _, _, _ = component(coefficients, f, 1, s, t)
-    z, zs, zt, _, _, _ = component(coefficients, f, 2, s, t)
+def _interpolated(polynomials, f, s, t):
+    """Return the values at (s, t) of the `polynomials` of facet `f`, and their derivatives."""
+    x, xs, xt, _, _, _ = component(polynomials, f, 0, s, t)
+    y, ys, yt, _, _, _ = component(polynomials, f, 1, s, t)
+    z, zs, zt, _, _, _ = component(polynomials, f, 2, s, t)
     return (x, y, z), (xs, ys, zs), (xt, yt, zt)
 
 

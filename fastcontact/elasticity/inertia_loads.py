@@ -9,14 +9,7 @@ import numpy as np
 
 from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.elasticity.loads import (
-    DensityField,
-    Table,
-    VolumeLoad,
-    add_point_forces,
-    quadrature_points,
-    solid_rows,
-)
+from fastcontact.elasticity.loads import DensityField, Table, VolumeLoad, add_forces, quadrature_points, solid_rows
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.errors import ModelError
@@ -71,7 +64,7 @@ class InertiaLoad(VolumeLoad):
             x, N, volume = quadrature_points(mesh, element, cells, kinematics)
             densities = np.full(volume.shape, np.nan) if density is None else density.at(element, rows, N)
             missing += int(np.isnan(densities).any(axis=1).sum())
-            add_point_forces(forces, cells, N, self.acceleration(x, kinematics) * (volume * densities)[:, :, None])
+            add_forces(forces, cells, N, self.acceleration(x, kinematics) * (volume * densities)[:, :, None])
         if missing:
             raise ModelError(
                 f"{self.name} needs densities, but the materials of {missing} solid cells have none: give them density=..., "

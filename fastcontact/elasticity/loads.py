@@ -110,7 +110,7 @@ class Load:
         """Add the nodal forces due to the `_force_density` on all cells to `forces` (n_points, dim)."""
         for element, cells in self.cells(mesh).items():
             x, N, measure = quadrature_points(mesh, element, cells, kinematics)
-            add_point_forces(forces, cells, N, self._force_density(x) * measure[:, :, None])
+            add_forces(forces, cells, N, self._force_density(x) * measure[:, :, None])
 
     def _force_density(self, x: Array) -> Array:
         """Return the force per unit area or volume (c, q, dim) at positions `x` (c, q, dim) [length]."""
@@ -136,7 +136,7 @@ class Pressure(Load):
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for element, facets in self.cells(mesh).items():
             x, N, vectors = facet_points(mesh, element, facets, kinematics)
-            add_point_forces(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * vectors)
+            add_forces(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * vectors)
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ class TotalForce(ComponentLoad):
         nodal_areas, area = np.zeros((mesh.n_points, 1)), 0.0
         for element, facets in self.cells(mesh).items():
             _, N, measure = quadrature_points(mesh, element, facets, kinematics)
-            add_point_forces(nodal_areas, facets, N, measure[:, :, None])
+            add_forces(nodal_areas, facets, N, measure[:, :, None])
             area += float(measure.sum())
         for axis, value in self.components.items():
             forces[:, axis] = nodal_areas[:, 0] * (value / area)
@@ -389,7 +389,7 @@ def quadrature_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str)
     return x, N, cell_volumes(mesh.points[cells], N, dN, kinematics == "axisymmetric") * weights
 
 
-def add_point_forces(forces: Array, cells: Numbers, N: Array, point_forces: Array) -> None:
+def add_forces(forces: Array, cells: Numbers, N: Array, point_forces: Array) -> None:
     """Distribute forces at quadrature points to the nodes with the shape functions, and add them to nodal `forces`, in place.
 
     `forces` (n_points, dim) and `point_forces` (c, q, dim) have the same unit, such as [force]. `cells` (c, n) of int

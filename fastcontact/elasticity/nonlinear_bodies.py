@@ -258,9 +258,7 @@ class NonlinearBodies:
             halved_bodies = self.at(end, self.at(middle, old_history, tangent=False).history, tangent=False)
         except ConvergenceError:
             return 0.0, 0.0
-        weights = np.sqrt(
-            [1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim]
-        )  # shear counts twice in the norm of a tensor
+        weights = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # of components in the norm of a tensor
         stresses = (bodies.stress, halved_bodies.stress)
         parts = [[(s[name][points] * weights).ravel() for name, points in flowing.items()] for s in stresses]
         stress, halved_stress = map(np.concatenate, parts)

@@ -20,7 +20,7 @@ from fastcontact.elasticity.loads import (
     Table,
     Value,
     VolumeLoad,
-    add_point_forces,
+    add_forces,
     check_points,
     evaluated,
     quadrature_points,
@@ -102,7 +102,7 @@ class Heating(Load):
         for element, cells in self.cells(mesh).items():
             x, N, _ = quadrature_points(mesh, element, cells, kinematics)
             measure = quadrature_points(deformed, element, cells, kinematics)[2]
-            add_point_forces(total, cells, N, (evaluated(self.value, x, self.name) * measure)[:, :, None])
+            add_forces(total, cells, N, (evaluated(self.value, x, self.name) * measure)[:, :, None])
         return total[:, 0]
 
 
@@ -190,6 +190,6 @@ class Film(TemporaryHeat):
                 raise ModelError(f"the coefficient of {self.name} is {h.min():g}: it must not be negative")
             h *= quadrature_points(deformed, element, facets, kinematics)[2]
             rise = evaluated(self.ambient, x, f"the ambient temperature of {self.name}") - reference
-            add_point_forces(powers, facets, N, (h * rise)[:, :, None])
+            add_forces(powers, facets, N, (h * rise)[:, :, None])
             blocks.append((facets, facets, np.einsum("fq,qa,qb->fab", h, N, N)))
         return assembled(blocks, (mesh.n_points, mesh.n_points)), powers[:, 0]

@@ -16,28 +16,26 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
     The boxes contain the nodes, extended at curved sides by the bound on the deviation of the facet from flat triangles.
     `to_terms` and `weights` are those of `facet_tables.Tables`.
     """
-    nodes, centre, coefficients, deviations, bounds = facets
+    nodes, centre, C, deviations, bounds = facets
     m = nodes.shape[1]
     for i in range(begin, end):
         for d in range(3):
             if m <= 4:
-                _fill_straight(nodes, centre, i, d, coefficients, low, high)
+                _fill_straight(nodes, centre, i, d, C, low, high)
             else:
-                _fill_curved(nodes, centre, i, d, to_terms, coefficients, low, high)
+                _fill_curved(nodes, centre, i, d, to_terms, C, low, high)
         deviations[i], bounds[i] = 0.0, np.inf
         if m == 3:
             continue
-        deviation, turn, second = _curvature(coefficients, i, weights)
+        deviation, turn, second = _curvature(C, i, weights)
         for d in range(3 if m > 4 else 0):
             low[i, d], high[i, d] = low[i, d] - deviation, high[i, d] + deviation
         extent = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1], high[i, 2] - low[i, 2]
         if deviation >= LENGTH_ROUND_OFF * max(extent):  # otherwise the facet is flat
             deviations[i] = deviation
-        p, q = vector(coefficients, i, 1), vector(coefficients, i, 2)
+        p, q = vector(C, i, 1), vector(C, i, 2)
         diagonal = np.sqrt(dot(extent, extent))
-        bounds[i] = (
-            uniqueness_bound(p, q, vector(coefficients, i, 3)) if m == 4 else _convexity(p, q, turn, second, diagonal)
-        )
+        bounds[i] = uniqueness_bound(p, q, vector(C, i, 3)) if m == 4 else _convexity(p, q, turn, second, diagonal)
 
 
 @inlined_kernel

@@ -170,9 +170,8 @@ def _downhill(coefficients, f, s, t, sides, point, value, hss, hst, htt):
         length = 0.1 / np.sqrt(us * us + ut * ut)
         for step in (length, -length):
             ps, pt = step * us, step * ut
-            if not _inside(sides, s + ps, t + pt):
-                continue
-            if half_square(coefficients, f, s + ps, t + pt, point) < value * (1.0 - 1e-12):
+            is_lower = half_square(coefficients, f, s + ps, t + pt, point) < value * (1.0 - 1e-12)
+            if is_lower and _inside(sides, s + ps, t + pt):
                 return ps, pt
     return 0.0, 0.0
 

@@ -84,16 +84,11 @@ def _projected(facets, f, domain, point, reach):
 
     The last two results are whether the projection converged, and whether it certainly lies inside the facet.
     """
-    coefficients = facets.coefficients
-    if coefficients.shape[1] <= 4:
-        o, a, b, c = (
-            vector(coefficients, f, 0),
-            vector(coefficients, f, 1),
-            vector(coefficients, f, 2),
-            _twist(coefficients, f),
-        )
+    C = facets.coefficients
+    if C.shape[1] <= 4:
+        o, a, b, c = vector(C, f, 0), vector(C, f, 1), vector(C, f, 2), _twist(C, f)
         r = minus(point, o)
-        if coefficients.shape[1] == 3:
+        if C.shape[1] == 3:
             s, t = on_flat(r, a, b)
             inside, d = s > ROUND_OFF and t > ROUND_OFF and 1.0 - s - t > ROUND_OFF, 0.0
         else:
@@ -103,14 +98,10 @@ def _projected(facets, f, domain, point, reach):
         offset = minus(point, foot)
         if d == np.inf:
             return s, t, foot, np.inf, True, False
-        if coefficients.shape[1] == 3 or (abs(dot(offset, c)) < facets.convexity_bound[f] and d >= 0.0):
+        if C.shape[1] == 3 or (abs(dot(offset, c)) < facets.convexity_bound[f] and d >= 0.0):
             return s, t, foot, dot(offset, offset), True, inside
     s, t, d, converged = project(facets, f, domain, point, reach)
-    foot = (
-        component(coefficients, f, 0, s, t)[0],
-        component(coefficients, f, 1, s, t)[0],
-        component(coefficients, f, 2, s, t)[0],
-    )
+    foot = component(C, f, 0, s, t)[0], component(C, f, 1, s, t)[0], component(C, f, 2, s, t)[0]
     offset = minus(point, foot)
     return s, t, foot, np.inf if d == np.inf else dot(offset, offset), converged, False
 

@@ -179,9 +179,7 @@ def test_facets_are_prepared_as_they_are(seed, m, bend):
     facets, low, high = prepared(corners)
     xi = grid(OF_SIZE[m], 21)
     places = on(corners[0], m, xi)
-    polynomial = np.array(
-        [[projection3d.component(facets.coefficients, 0, d, *place)[0] for d in range(3)] for place in xi]
-    )
+    polynomial = np.array([[projection3d.component(facets.coefficients, 0, d, *x)[0] for d in range(3)] for x in xi])
     assert np.abs(polynomial - places).max() < 1e-13
     assert (places >= low - 1e-13).all()
     assert (places <= high + 1e-13).all()
