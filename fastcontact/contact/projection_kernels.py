@@ -49,8 +49,8 @@ def angles(nodes, n_corners, out):
 def coefficients(values, to_terms, first, begin, end, out):
     """Fill rows ``first + begin`` to ``first + end - 1`` of `out` (n_facets, width, 3) with polynomial coefficients.
 
-    They interpolate the `values` (n, m, 3) at the nodes of the facets `begin` to ``end - 1``.
-    `to_terms` (m, m) are those of `facet_tables.Tables`.
+    They interpolate the `values` (n, m, 3) at the nodes of the facets `begin` to ``end - 1``. `to_terms` (m, m) are those of
+    `facet_tables.Tables`.
     """
     m = values.shape[1]
     for f in range(begin, end):

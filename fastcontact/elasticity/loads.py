@@ -392,7 +392,7 @@ def quadrature_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str)
 def add_forces(forces: Array, cells: Numbers, N: Array, point_forces: Array) -> None:
     """Distribute forces at quadrature points to the nodes with the shape functions, and add them to nodal `forces`, in place.
 
-    `forces` (n_points, dim) and `point_forces` (c, q, dim) have the same unit, such as [force]. `cells` (c, n) of int
-    contains the nodes of the cells, and `N` (q, n) [-] the shape functions.
+    `forces` (n_points, dim) [force] and `point_forces` (c, q, dim) [force] may also have another unit, the same for both.
+    `cells` (c, n) of int contains the nodes of the cells, and `N` (q, n) [-] the shape functions.
     """
     np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, point_forces))

@@ -30,7 +30,7 @@ _CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 def triangulated_body(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, with all cells in the group `solid`.
 
-    Each of the `sides` consists of a name and nodes (n, 2) [length]. The sides are in counter-clockwise order, and each
+    Each of the `sides` (n, 2) [length] consists of a name and its nodes. The sides are in counter-clockwise order, and each
     begins where the previous one ends. `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
