@@ -20,9 +20,10 @@ from fastcontact._jit import cache, compiling, interpreting
 
 log = logging.getLogger("fastcontact")
 
-# Operations are executed as written, without fused multiply-add. A kernel that is called by other kernels exists in several
-# copies, one compiled separately and one inside each caller, with different optimisations. Which copy runs depends on the
-# kernels that were compiled or loaded before. Without these flags, the results of all copies are bitwise identical.
+# No fast-math flags: operations are executed as written, without fused multiply-add. A kernel that is called by other kernels
+# exists in several copies, one compiled separately and one inside each caller, with different optimisations. Which copy runs
+# depends on the kernels that were compiled or loaded before. Only without flags are the results of all copies bitwise
+# identical.
 AS_WRITTEN: set[str] = set()
 # Flags that permit vectorised sums, for kernels of which only one copy exists, because they neither call other kernels nor
 # are called by them.

@@ -23,7 +23,7 @@ from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
-from fastcontact.elasticity.incompatible_modes import PAIRS
+from fastcontact.elasticity.incompatible_modes import VOIGT
 from fastcontact.elasticity.mass import cell_portions
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.elasticity.stiffness import rigid_modes
@@ -204,7 +204,7 @@ def _work_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
         (N, dN, weights), cells = elements.get(name).tables, mesh.cells[name][rows]
         gradient, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
         stress, volume = N @ last.stress[cells], np.abs(volume) * weights
-        stress_tensor = stress[..., PAIRS[mesh.dim]]
+        stress_tensor = stress[..., VOIGT[mesh.dim]]
         strain_work = np.einsum("cqij,cqij->cq", stress_tensor, gradient)
         if axisymmetric:
             radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))

@@ -290,7 +290,7 @@ def recover(
         stress = nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
     by_material = None
     if len(problem.sides.points):
-        materials_of_cells = np.concatenate(list(problem.field.distinct.values()))
+        materials_of_cells = np.concatenate(list(problem.field.distinct_materials.values()))
         stress, by_material = nodal_stress_of_materials(problem.sides, materials_of_cells, stress, mesh.n_points)
     equivalent, units = von_mises(stress), problem.model.units
     return StepResult(

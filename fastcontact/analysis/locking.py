@@ -31,8 +31,8 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity import incompatible_modes, recovery
-from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
-from fastcontact.elasticity.incompatible_modes import BENDING as BENDING_ELEMENTS
+from fastcontact.elasticity.energy import cell_volumes, integration_rule, twice_energy_density
+from fastcontact.elasticity.incompatible_modes import ELEMENTS_WITH_MODES
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.recovery import BATCH, CellStress
@@ -115,7 +115,7 @@ def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name:
         volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
         compliance, mean_weights = field.compliance[numbers][:, None], volume * selected[numbers, None]
         integrals = [
-            *(elastic_energy(values, compliance) * volume for values in (difference, computed)),
+            *(twice_energy_density(values, compliance) * volume for values in (difference, computed)),
             *(values[..., :3].mean(axis=2) ** 2 * mean_weights for values in (difference, computed)),
         ]
         np.add.at(sums, body[cells[:, 0]], np.sum(integrals, axis=2).T)
@@ -142,7 +142,7 @@ def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[
     """Return a warning where the stresses of linear cells differ much from recovered ones."""
     model, linear = problem.model, problem.bodies is None
     have_modes = all(material.incompatible_modes for material, _ in model.materials)
-    bending = BENDING_ELEMENTS if have_modes else ()
+    bending = ELEMENTS_WITH_MODES if have_modes else ()
     names = [name for name in model.mesh.solids if elements.get(name).order == 1 and name not in bending]
     energy, mean_stress = _stress_scatter(problem, state, step, names)
     if mean_stress > ALTERNATING:

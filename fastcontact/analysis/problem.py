@@ -350,7 +350,7 @@ def prepare(
     )  # fmt: skip
     field = model.material_field()
     solver.contrast = field.contrast
-    sides = material_sides(mesh, field.distinct)
+    sides = material_sides(mesh, field.distinct_materials)
     K = stiffness(mesh, model.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
     warnings = stiffness_warnings(K, model.springs)
     K = with_springs(K, model.springs)

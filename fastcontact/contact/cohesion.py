@@ -62,16 +62,16 @@ class CohesiveLaw:
 
         They depend only on the mode ratio, the ratio of `opening` to `sliding` (m,) [length].
         """
-        normal, shear = self.strength / self.stiffness, self.shear_strength / self.stiffness
+        opening_onset, sliding_onset = self.strength / self.stiffness, self.shear_strength / self.stiffness
         square = np.maximum(opening, 0.0) ** 2 + sliding**2
         shear_fraction = np.divide(sliding**2, square, out=np.zeros_like(square), where=square > 0.0)
         interpolation = shear_fraction**self.exponent
         if self.initiation == "quadratic":
-            onset = ((1.0 - shear_fraction) / normal**2 + shear_fraction / shear**2) ** -0.5
+            onset = ((1.0 - shear_fraction) / opening_onset**2 + shear_fraction / sliding_onset**2) ** -0.5
         elif self.initiation == "maximum":
-            onset = np.maximum((1.0 - shear_fraction) / normal**2, shear_fraction / shear**2) ** -0.5
+            onset = np.maximum((1.0 - shear_fraction) / opening_onset**2, shear_fraction / sliding_onset**2) ** -0.5
         else:
-            onset = np.sqrt(normal**2 + (shear**2 - normal**2) * interpolation)
+            onset = np.sqrt(opening_onset**2 + (sliding_onset**2 - opening_onset**2) * interpolation)
         if self.mixed_mode == "power":
             opening_term = ((1.0 - shear_fraction) / self.energy) ** self.exponent
             energy = (opening_term + (shear_fraction / self.shear_energy) ** self.exponent) ** (-1.0 / self.exponent)
@@ -90,9 +90,9 @@ class CohesiveLaw:
         return damage if self.reversible else np.maximum(damage, previous)
 
     def dissipated_energy(self, opening: Array, sliding: Array, damage: Array) -> Array:
-        """Return the energy (m,) per area that `damage` (m,) has dissipated [pressure length].
+        """Return the energy (m,) per area that is dissipated until the damage reaches `damage` (m,) [pressure length].
 
-        It is that at the mode ratio of `opening` and `sliding` (m,) [length].
+        The separation grows at the mode ratio of `opening` and `sliding` (m,) [length].
         """
         onset, final = self.limits(opening, sliding)
         separation = onset * final / (final - damage * (final - onset))  # at which `damage` is reached
@@ -100,7 +100,7 @@ class CohesiveLaw:
 
 
 def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **options: Any) -> CohesiveLaw:
-    """Return a law with a strength [pressure] and a fracture energy [pressure length], and other parameters as `options`.
+    """Return the law with a strength [pressure], a fracture energy [pressure length], and other parameters in `options`.
 
     By default, the limits in sliding are those in opening, and in pure opening damage begins at the fraction INITIATION_RATIO
     of the opening at break.
@@ -112,7 +112,7 @@ def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **
 
 @record
 class Bond:
-    """State of a cohesive layer at the end of a load step.
+    """State of a cohesive layer of m points at the end of a load step.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Bond:
     damage : ndarray (m,)
         Damage, from 0 (intact) to 1 (broken) [-].
     released : float
-        Energy dissipated by damage so far [energy]; for adhesion, the energy of the law minus `stored`.
+        Energy dissipated by damage so far; for adhesion, it is recovered as damage heals [energy].
     stored : float
         Elastic energy of the undamaged fraction [energy].
     """

@@ -34,8 +34,8 @@ class CohesiveLayer:
     Attributes
     ----------
     law : CohesiveLaw
-    directions : tuple of ndarray (m, dim)
-        Tangents [-].
+    directions : tuple of k ndarray (m, dim)
+        Unit tangents [-].
     areas : ndarray (m,)
         Tributary areas [area].
     initial_bond : Bond
@@ -134,13 +134,13 @@ def cohesive_rows(
     slips = [s0 + T @ u for T, s0 in zip(constraints.tangents, slip0, strict=True)]
     opening = constraints.gaps(config.displacement) - initial_gap
     damage = law.damage(opening, np.sqrt(sum((s**2 for s in slips), zeros)), damage)
-    # In the first pairing of a step, an obstacle may have moved while the body has not. This opening causes no damage.
+    # In the first pairing of a step, an obstacle may have moved and the body not yet. The resulting opening causes no damage.
     if config.bond is not None and np.array_equal(u, start):
         damage = np.minimum(damage, bond.damage)
     intact, separation = damage < 1.0, np.stack([opening, *slips])
     secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(separation), 1))
     compression = max(1.0, COMPRESSION_FACTOR * body_stiffness / law.stiffness) if law.reversible else 1.0
-    # Otherwise the sign of an opening that is round-off would change the branch of the law.
+    # Where the secant is `compression` already, the branch must not depend on the sign of an opening that is round-off.
     stiffened = (opening < 0.0) & (secant[0] != compression)
     secant[0, stiffened] = compression
     growing = intact & (damage > (0.0 if law.reversible else bond.damage))
@@ -200,7 +200,7 @@ def _axes_along(vectors: Array) -> tuple[Array, Indices]:
     They are Householder reflections that map each vector to the axis nearest to it, and the identity for zero vectors.
     """
     magnitude = np.abs(vectors)
-    # The first of the components that are equal up to round-off.
+    # The first of the largest components, which may be equal up to round-off.
     axis = np.argmax(magnitude >= (1.0 - SINGLE_PRECISION) * magnitude.max(axis=0), axis=0)
     columns = np.arange(len(axis))
     w = vectors / np.maximum(np.linalg.norm(vectors, axis=0), TINY)

@@ -1,7 +1,7 @@
 """Thermal contact conductance as a function of pressure and gap, and the discrete heat transfer between the two sides.
 
 The heat flow at a constraint is ``h * area * (T_secondary - T_primary)``, where temperatures are weighted with the test
-functions of the gap of the constraint. The transpose distributes heat flows to the nodes. The shape functions of the mortar
+functions of the gap of the constraint. The same weights distribute heat flows to the nodes. The shape functions of the mortar
 multiplier sum to one, so that a uniform flux is transmitted exactly between non-matching meshes (Hueber and Wohlmuth,
 2009, section 3).
 """
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from fastcontact.contact.constraints import Constraints
     from fastcontact.contact.obstacles.rigid_side import RigidSide
 
-TABLES = ("pressure", "gap")
+TABLE_KEYS = ("pressure", "gap")
 
 
 class Conductance:
-    """Thermal conductance of a contact: heat flow per area and temperature difference [power / (area temperature)].
+    """Thermal conductance of a contact: heat flow per unit area and temperature difference [power / (area temperature)].
 
     Raises ContactError if `law` has none of the forms below.
 
@@ -52,12 +52,12 @@ class Conductance:
             if not 0.0 <= law < np.inf:
                 raise ContactError(f"the conductance {law} of contact '{name}' must be a number, zero or more")
             tables = {"pressure": [(0.0, law)]}
-        if not tables or not set(tables) <= set(TABLES):
+        if not tables or not set(tables) <= set(TABLE_KEYS):
             raise self._invalid()
         self._tables = {key: self._table(rows) for key, rows in tables.items()}
 
     def _table(self, rows: Any) -> Array:
-        """Return pairs as an array (n, 2)."""
+        """Return the pairs `rows` as an array (n, 2), or raise ContactError."""
         table = number_pairs(rows)
         ascending = table is not None and np.isfinite(table).all() and (np.diff(table[:, 0]) > 0.0).all()
         if table is None or not ascending or not len(table) or table.min() < 0.0:
@@ -127,11 +127,11 @@ class HeatTransfer:
         return csr_array(self.secondary - self.primary)
 
     def matrix(self, h: Array) -> csr_array:
-        """Return the matrix (n_points, n_points) of conductances `h` (m,) [power / temperature]."""
+        """Return the conductance matrix (n_points, n_points) for conductances `h` (m,) per area [power / temperature]."""
         return csr_array(self.jump.T @ diags_array(h * self.area) @ self.jump)
 
     def nodal_powers(self, power: Array) -> Array:
-        """Return the nodal powers (n_points,) of heat generated at the constraints (m,), half of it on each side [power]."""
+        """Return the nodal powers (n_points,) of a heat `power` (m,) at the constraints, half of it on each side [power]."""
         return np.asarray(0.5 * (self.secondary.T @ power + self.primary.T @ power))
 
 
@@ -155,5 +155,5 @@ def heat_transfer(
     weights = sum(diags_array(scale[:, axis]) @ components[axis] for axis in range(dim))
     assert constraints.areas is not None
     is_facing = np.isfinite(constraints.areas) & (square > 0.0)
-    on_side = csr_array(weights @ diags_array(on_secondary.astype(float)))
-    return HeatTransfer(on_side, csr_array(on_side - weights), np.where(is_facing, constraints.areas, 0.0))
+    of_secondary = csr_array(weights @ diags_array(on_secondary.astype(float)))
+    return HeatTransfer(of_secondary, csr_array(of_secondary - weights), np.where(is_facing, constraints.areas, 0.0))

@@ -79,7 +79,7 @@ def unrolled_line(surface: Surface, coordinates: Array, middle: Array | None) ->
 
 def _nodes_of_closed_line(surface: Surface) -> list[int] | None:
     """Return the nodes, numbered on the surface, in order along its closed line; None if it is not a single closed line."""
-    # The nodes of each facet in order along the line, without its end.
+    # The nodes of each facet in order along the line, without the last one, which belongs to the next facet.
     chains = [chain for block in surface.blocks for chain in np.delete(block.local, 1, axis=1).tolist()]
     successors = surface.line_neighbours[:, 1].tolist()
     order = [0]
@@ -98,7 +98,7 @@ class ContactMiddle:
         Position of the middle on the surface, or on the axis [length].
     line : UnrolledLine, optional
         The surface as a line, along which positions are arc lengths.
-    start : float
+    arc_length : float
         Arc length at the middle [length].
     reversed : bool
         Whether arc lengths increase against the direction of the line.
@@ -116,7 +116,7 @@ class ContactMiddle:
 
     position: Array
     line: UnrolledLine | None = None
-    start: float = 0.0
+    arc_length: float = 0.0
     reversed: bool = False
     direction: Array | None = None
     ignored: tuple[Array, ...] = ()
@@ -126,10 +126,10 @@ class ContactMiddle:
     def distances(self, positions: Array) -> Array:
         """Return the distances (n,) of reference positions (n, dim) from the middle, signed along a line [length]."""
         if self.line is not None:
-            arc_length = self.line.lengths(positions) - self.start
+            distance = self.line.lengths(positions) - self.arc_length
             if self.line.period:
-                arc_length -= self.line.period * np.round(arc_length / self.line.period)
-            return -arc_length if self.reversed else arc_length
+                distance -= self.line.period * np.round(distance / self.line.period)
+            return -distance if self.reversed else distance
         for first, second, rotation in self.periods:
             images = [positions, first + (positions - second) @ rotation, second + (positions - first) @ rotation.T]
             closest_image = np.linalg.norm(np.array(images) - self.position, axis=2).argmin(axis=0)
@@ -236,7 +236,8 @@ def _middle_in_2d(
     """Return the middle on a surface in a plane model.
 
     A surface in several pieces is projected along its mean normal. The positions `points` (n_nodes, 2) of the nodes differ
-    from their `coordinates` [length] if the contact has `crossed` periodic ends, see `ContactMiddle.periods`.
+    from their `coordinates` [length] if the contact has `crossed` periodic ends, see `ContactMiddle.periods`. For the other
+    parameters, see `_middle_in_3d`.
     """
     length = float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
@@ -245,17 +246,17 @@ def _middle_in_2d(
         size = float(np.ptp(coordinates[surface.points], axis=0).max())
         line = UnrolledLine(centre + np.outer([-size, size], tangent), np.array([0.0, 2.0 * size]))
     lengths = line.lengths(coordinates[surface.points])
-    start, backward, direction = float(weight @ lengths), False, tangent if length > FACING else None
+    arc_length, backward, direction = float(weight @ lengths), False, tangent if length > FACING else None
     if crossed:
         jump = float(-np.diff(line.lengths(np.array(crossed[0][:2])))[0])
-        start = float(weight @ (lengths + jump * (points != coordinates[surface.points]).any(axis=1)))
-        if not 0.0 <= start <= line.abscissa[-1]:
-            start -= jump
+        arc_length = float(weight @ (lengths + jump * (points != coordinates[surface.points]).any(axis=1)))
+        if not 0.0 <= arc_length <= line.abscissa[-1]:
+            arc_length -= jump
         line, direction = replace(line, period=abs(jump)), None
     elif len(planes) == 1 and not line.period:
         direction, on_plane = planes[0]
         ends = lengths[on_plane]  # both ends of a half ring lie on the plane
-        start = float(ends[np.argmin(np.abs(ends - start))])
-        backward = start > 0.5 * (lengths.min() + lengths.max())
-    position = np.array([np.interp(start, line.abscissa, line.nodes[:, axis]) for axis in range(2)])
-    return ContactMiddle(position, line, start, backward, tangent=direction)
+        arc_length = float(ends[np.argmin(np.abs(ends - arc_length))])
+        backward = arc_length > 0.5 * (lengths.min() + lengths.max())
+    position = np.array([np.interp(arc_length, line.abscissa, line.nodes[:, axis]) for axis in range(2)])
+    return ContactMiddle(position, line, arc_length, backward, tangent=direction)

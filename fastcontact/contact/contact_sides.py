@@ -154,8 +154,8 @@ class ContactSides:
         It is the negative of the motion of a rigid primary side in the step. Between two bodies, if `slip` is
         ``"symmetric"``, it is the negative of the tangential displacement that closes the gap. On curved surfaces, in
         particular at the edge of the contact, the normal of the primary side is inclined to the direction in which the gap
-        closes. A component of this motion would then count as slip. The gap is assumed to close along the mean of the normals
-        of both sides, which is exact for two bodies that are mirror images. `directions` are k unit tangents (n, dim).
+        closes. A component of the closing motion would then count as slip. The gap is assumed to close along the mean normal
+        of the two sides, which is exact for two bodies that are mirror images. `directions` are k unit tangents (n, dim).
         """
         if isinstance(self.primary, RigidSide):
             obstacle_motion = self.rigid_motion(candidates.positions, config)
@@ -224,8 +224,8 @@ class ContactSides:
             axes = smoothing.frames(self.points + config.displacement)
             factor = smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
             slope = factor * smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
-            if pairing.beyond is not None:  # The extensions of facets are straight.
-                slope = np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
+            if pairing.overhang_xi is not None:  # The extensions of facets are straight.
+                slope = np.where(pairing.overhang_xi[rows] == 0.0, slope, 0.0)
         return SurfacePoints(candidates, pairing, rows, primary, normals, closest, slope)
 
     def rigid_motion(self, positions: Callable[[Array], Array], config: Configuration) -> Array:

@@ -42,25 +42,25 @@ def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict
 
 
 def default_against_obstacle(
-    dim: int, facets: Collection[str], of_simplices: bool, options: Mapping[str, Any]
+    dim: int, facet_types: Collection[str], of_simplices: bool, options: Mapping[str, Any]
 ) -> tuple[str, dict[str, Any], str]:
     """Return the default formulation of a side against a rigid obstacle, its options, and the reason for the choice.
 
     Parameters
     ----------
     dim : int
-    facets : collection of str
+    facet_types : collection of str
         Element types of the facets of the side.
     of_simplices : bool
         Whether all facets belong to linear triangles or tetrahedra.
     options : mapping
         Options given by the user.
     """
-    if facets and "integration" not in options:
-        if of_simplices and all(elements.get(name).linear == name for name in facets):
+    if facet_types and "integration" not in options:
+        if of_simplices and all(elements.get(name).linear == name for name in facet_types):
             reason = "the pressures of continuous contact oscillate on linear triangles and tetrahedra"
             return "node_to_segment", dict(options), reason
-        if dim == 3 and all(all_nodes_carry_pressure(name) for name in facets):
+        if dim == 3 and all(all_nodes_carry_pressure(name) for name in facet_types):
             return "node_to_segment", dict(options), "continuous contact costs many times as much in three dimensions"
         if dim == 3 and options.get("friction") and not any(name in options for name in STANDARD_OPTIONS):
             reason = "multigrid cannot eliminate continuous contact with friction in three dimensions"

@@ -165,7 +165,7 @@ def facing_points(facets: OuterFacets, distance: float | None, angle: float) -> 
 
 
 def _search(facets: OuterFacets, distance: float | None, angle: float, searched: Mask) -> FacingPoints:
-    """Return the points at which the facets that the mask `searched` (n,) marks face another body."""
+    """Return the points at which facets marked in `searched` (n,) face another body; see `facing_points` for the limits."""
     by_body = (_arrays_of_body(facets, body, distance, angle, searched) for body in np.unique(facets.body))
     return FacingPoints(*map(np.concatenate, zip(*by_body, strict=True)))
 

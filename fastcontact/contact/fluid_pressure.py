@@ -2,10 +2,10 @@
 
 A node is open to the fluid if its contact pressure is at most the fluid pressure or, in the first pairing, if its gap is
 open. Open nodes of the same facet are connected. At open nodes that are connected with the source, the fluid pressure
-replaces the contact pressure. It acts on each side along the normals of this side and over its own area, because the areas
-that a front encloses on both sides differ unless their gap is small: the pressure on the primary side is that at the closest
-point of the secondary side. With finite strains, normals and areas are those of the deformed surfaces at which the bodies are
-linearised, and their variation enters the tangent.
+replaces the contact pressure. The fluid acts on each side along the normals of this side and over its own area, because the
+areas within the front of the fluid differ between the sides unless the gap is small. The pressure on the primary side is that
+at the closest point of the secondary side. With finite strains, normals and areas are those of the deformed surfaces at which
+the bodies are linearised, and their variation enters the tangent.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class WettedRegion:
     pressure : ndarray (n_nodes,)
         Fluid pressure at the secondary nodes [pressure].
     nodal_weights : csr_array (n_points, n_nodes)
-        Matrix whose product with the area vectors at the secondary nodes is minus the nodal forces [force].
+        Matrix whose product with the area vectors at the secondary nodes is minus the nodal forces on this side [force].
     areas : AreaVectors
         Area vectors of the secondary side.
     primary : WettedFacets, optional
@@ -101,16 +101,16 @@ class WettedFacets:
 
     @classmethod
     def opposite(
-        cls, primary: Surface, areas: AreaVectors, displacement: Array, nodal: Array, carriers: Mask
+        cls, primary: Surface, areas: AreaVectors, displacement: Array, nodal_pressure: Array, carriers: Mask
     ) -> WettedFacets:
         """Return the part of a `primary` side that faces the wetted part of the secondary side, at a `displacement`.
 
-        `nodal` (n_nodes,) are the fluid pressures at the secondary nodes [pressure], of which the `carriers` (n_nodes,) have
-        wetted constraints.
+        `nodal_pressure` (n_nodes,) are the fluid pressures at the secondary nodes [pressure]. The mask `carriers` (n_nodes,)
+        marks the nodes with wetted constraints, which transmit the force.
         """
         side, current, pressures, nodes = areas.side, areas.points + displacement, list[Array](), list[Indices]()
-        numbers = np.flatnonzero(carriers)
-        tree = KDTree(areas.points[side.points[numbers]])
+        carrier_numbers = np.flatnonzero(carriers)
+        tree = KDTree(areas.points[side.points[carrier_numbers]])
         for block in primary.blocks:
             element, xi = elements.get(block.element), fine_rule(block.element)[0]
             x, shape = current[block.facets], (len(block.facets), len(xi))
@@ -118,13 +118,12 @@ class WettedFacets:
             foot = closest_of_types(positions, side.node_positions(current))
             on_side = facet_points(side, foot.facet, foot.xi)
             vectors = area_vectors(x, element.gradient(xi)).reshape(positions.shape)
-            away = np.einsum("nd,nd->n", vectors, foot.normal) > FACING_AWAY * np.linalg.norm(vectors, axis=1)
-            faces = (foot.overhang <= SMALL_OVERHANG) & ~away
-            pressures.append(
-                np.where(faces, np.einsum("nk,nk->n", on_side.shape, nodal[on_side.local]), 0.0).reshape(shape)
-            )
+            faces_away = np.einsum("nd,nd->n", vectors, foot.normal) > FACING_AWAY * np.linalg.norm(vectors, axis=1)
+            is_facing = (foot.overhang <= SMALL_OVERHANG) & ~faces_away
+            at_feet = np.einsum("nk,nk->n", on_side.shape, nodal_pressure[on_side.local])
+            pressures.append(np.where(is_facing, at_feet, 0.0).reshape(shape))
             reference = np.einsum("nk,nkd->nd", on_side.shape, areas.points[on_side.nodes])
-            nodes.append(numbers[tree.query(reference)[1]].reshape(shape))
+            nodes.append(carrier_numbers[tree.query(reference)[1]].reshape(shape))
         return cls(primary, areas.axisymmetric, areas.points, tuple(pressures), tuple(nodes))
 
     def by_node(self, displacement: Array, n_nodes: int) -> csr_array:
@@ -158,7 +157,8 @@ class WettedFacets:
 class AreaVectors:
     """Outward area vectors of the deformed secondary side at its nodes, per reference area (Nanson's formula).
 
-    They are means over the facets around a node, weighted with the square of its shape function, which cannot be negative.
+    They are means over the facets around a node, weighted with the square of the shape function of the node, because shape
+    functions of quadratic facets can be negative.
 
     Attributes
     ----------
@@ -214,38 +214,38 @@ def with_fluid_pressure(
     linearised_at = np.zeros_like(points) if deformation is None else deformation
     vectors = areas.with_derivative(linearised_at)[0]
     gaps = constraints.gaps(config.displacement)
-    nodal, node = constraints.nodal_field.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
+    nodal_gap, node = constraints.nodal_field.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     if config.pressure is None:
-        passable = nodal > LENGTH_ROUND_OFF * size
+        passable = nodal_gap > LENGTH_ROUND_OFF * size
     else:
         # A node under contact pressure is impermeable, even if it is open itself and only points near it are closed. Contact
         # pressures are forces per reference area.
         nominal = config.fluid_pressure * (1.0 if deformation is None else np.linalg.norm(vectors, axis=1))
         facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
-        passable = (nodal > -EDGE_PENETRATION * facet_size) & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
-    nodes = connected_nodes(side, source, passable)
-    rows = nodes[node] & constraints.usable
+        is_open = nodal_gap > -EDGE_PENETRATION * facet_size
+        passable = is_open & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
+    wetted = connected_nodes(side, source, passable)
+    rows = wetted[node] & constraints.usable
     # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
     # much larger than the side.
     distance_to_zero = size / SINGLE_PRECISION
     force = np.where(rows, config.fluid_pressure * constraints.areas, 0.0)
-    force_by_node = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
-    pressure, total = np.where(nodes, config.fluid_pressure, 0.0), force_by_node.sum(axis=0)
-    facets, transmits = None, np.ones(len(node))
-    if primary is not None and (total > 0.0).any():
+    force_by_node = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(wetted)))
+    pressure, nodal_force = np.where(wetted, config.fluid_pressure, 0.0), force_by_node.sum(axis=0)
+    facets, transmitted = None, np.ones(len(node))
+    if primary is not None and (nodal_force > 0.0).any():
         current = points + config.displacement
-        transmits = _narrowness(current[side.points], np.abs(nodal) / size, vectors, DeformedSide(primary, current))[
-            node
-        ]
-        field = constraints.nodal_field.pressure(force * (1.0 - transmits))
-        paired = np.bincount(node[constraints.usable], minlength=len(nodes)) > 0
-        field = np.where(nodes & _beyond(side, paired), pressure, field)
-        facets = WettedFacets.opposite(primary, areas, config.displacement, field, total > 0.0)
-    B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node], transmits)
+        x, relative_gap = current[side.points], np.abs(nodal_gap) / size
+        transmitted = _transmitted_fraction(x, relative_gap, vectors, DeformedSide(primary, current))[node]
+        direct_pressure = constraints.nodal_field.pressure(force * (1.0 - transmitted))
+        paired = np.bincount(node[constraints.usable], minlength=len(wetted)) > 0
+        direct_pressure = np.where(wetted & _unopposed(side, paired), pressure, direct_pressure)
+        facets = WettedFacets.opposite(primary, areas, config.displacement, direct_pressure, nodal_force > 0.0)
+    B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node], transmitted)
     if facets is not None:
-        of_total = rows / np.where(total > 0.0, total, np.inf)[node]
-        share = csr_array((of_total, (np.arange(len(node)), node)), shape=force_by_node.shape)
-        B = csr_array(B - share @ facets.by_node(linearised_at, len(nodes)))
+        per_force = rows / np.where(nodal_force > 0.0, nodal_force, np.inf)[node]
+        to_rows = csr_array((per_force, (np.arange(len(node)), node)), shape=force_by_node.shape)
+        B = csr_array(B - to_rows @ facets.by_node(linearised_at, len(wetted)))
         B.eliminate_zeros()
     soft = distance_to_zero / (config.fluid_pressure * constraints.areas)
     return replace(
@@ -260,13 +260,13 @@ def with_fluid_pressure(
 
 
 def _rows_along_area_vectors(
-    B: csr_array, rows: Mask, side: Surface, vectors: Array, transmits: Array
+    B: csr_array, rows: Mask, side: Surface, vectors: Array, transmitted: Array
 ) -> tuple[csr_array, csr_array]:
     """Return B (m, n_dofs) with secondary entries along area vectors in the marked `rows` (m,), and their weights.
 
     The weights (m, n_points) are those of the secondary points in these rows [-]. `vectors` (m, dim) are the area vectors of
-    the secondary `side` per area [-]. On the primary side, their component along the normal of the gap
-    acts, times the fraction `transmits` (m,) [-].
+    the secondary `side` per area [-]. On the primary side, their component along the normal of the gap acts, times the
+    fraction `transmitted` (m,) of the pressure [-].
     """
     (m, n_dofs), dim = B.shape, vectors.shape[1]
     entries = B.tocoo()
@@ -279,14 +279,14 @@ def _rows_along_area_vectors(
     replaced = on_secondary & rows[row]
     values = entries.data[replaced] * normal[row[replaced], component[replaced]]
     weights = csr_array((values, (row[replaced], point[replaced])), shape=(m, n_dofs // dim))
-    area_ratio = np.where(rows, -np.einsum("md,md->m", vectors, normal) * transmits, 1.0)
+    area_ratio = np.where(rows, -np.einsum("md,md->m", vectors, normal) * transmitted, 1.0)
     other_entries = csr_array((entries.data * area_ratio[row] * ~replaced, (row, entries.col)), shape=B.shape)
     with_area_vectors = csr_array(other_entries + rows_of(weights, -vectors))
     with_area_vectors.eliminate_zeros()
     return with_area_vectors, weights
 
 
-def _narrowness(x: Array, relative_gap: Array, vectors: Array, primary: DeformedSide) -> Array:
+def _transmitted_fraction(x: Array, relative_gap: Array, vectors: Array, primary: DeformedSide) -> Array:
     """Return the fraction (n_nodes,) of the pressure that is transmitted to the opposite side, one in narrow gaps [-].
 
     `x` (n_nodes, dim) are the positions of the secondary nodes [length], `relative_gap` (n_nodes,) their gaps over the size
@@ -298,7 +298,7 @@ def _narrowness(x: Array, relative_gap: Array, vectors: Array, primary: Deformed
     return np.asarray(np.prod([np.clip(2.0 - ratio, 0.0, 1.0) for ratio in ratios], axis=0))
 
 
-def _beyond(side: Surface, paired: Mask) -> Mask:
+def _unopposed(side: Surface, paired: Mask) -> Mask:
     """Return the nodes (n_nodes,) without an opposite facet, given which nodes have constraints that can close.
 
     On quadratic facets, a node may lack constraints although it has an opposite facet.
@@ -307,7 +307,7 @@ def _beyond(side: Surface, paired: Mask) -> Mask:
 
 
 def connected_nodes(side: Surface, source: Mask, passable: Mask) -> Mask:
-    """Return which `passable` nodes (n_nodes,) are connected with passable nodes of the `source` through facets."""
+    """Return which nodes (n_nodes,) are connected with the `source` by facets through `passable` nodes."""
     nodes, connected = np.flatnonzero(passable), np.zeros(len(passable), bool)
     component = connected_components(side.node_adjacency[nodes][:, nodes], directed=False)[1]
     connected[nodes] = np.isin(component, component[source[nodes]])

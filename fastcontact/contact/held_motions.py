@@ -193,8 +193,8 @@ def symmetry_planes(
     held, driven = motions.projectors_at(surface.points), motions.driven[surface.points]
     partly_held = np.trace(held, axis1=1, axis2=2) < points.shape[1] - 0.5
     tolerance, planes = PLANE_TOLERANCE * float(np.ptp(points, axis=0).max()), []
-    # Facets may be short compared with the surface: nodes next to the plane do not belong to it.
-    within = np.minimum(tolerance, 0.25 * surface.largest_diameters(coordinates))
+    # Where facets are short compared with the surface, a smaller tolerance excludes the nodes next to the plane.
+    nodal_tolerance = np.minimum(tolerance, 0.25 * surface.largest_diameters(coordinates))
     normals = DeformedSide(surface, coordinates).nodal_normals
     for axis in _held_directions(held[partly_held]):
         x, x_opposite = points @ axis, opposite @ axis
@@ -202,10 +202,10 @@ def symmetry_planes(
         for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):
             if np.ptp(x) <= tolerance or (outward * (x_opposite - end) > tolerance).any():
                 continue
-            nodes = np.flatnonzero(partly_held & (np.abs(x - end) <= within))
+            nodes = np.flatnonzero(partly_held & (np.abs(x - end) <= nodal_tolerance))
             on_plane = np.einsum("d,nde,e->n", axis, held[nodes], axis) >= SAME_DIRECTION**2
             on_plane &= ~driven[nodes][:, components].any(axis=1)
-            # Otherwise the plane does not cut the surface.
+            # A plane of symmetry cuts the surface nearly at a right angle.
             on_plane &= np.abs(normals[nodes] @ axis) < SMOOTH_INCLINATION
             if len(nodes) and on_plane.all():
                 planes.append((axis, nodes))

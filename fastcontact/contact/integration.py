@@ -66,7 +66,7 @@ def fine_rule(element: str) -> quadrature.Rule:
 
 
 def all_nodes_carry_pressure(element: str) -> bool:
-    """Return whether a uniform pressure on a facet has compressive forces at all of its nodes.
+    """Return whether the equivalent nodal forces of a uniform pressure on a facet are compressive at all of its nodes.
 
     At the corners of six-node triangles the forces vanish, and at those of eight-node quadrangles they are tensile.
     """
@@ -117,9 +117,9 @@ def even_at_axis(surface: Surface, points: Array) -> csr_array:
         on_axis = radii <= SINGLE_PRECISION * np.abs(points).max()  # as in `symmetry_axis.axis_nodes`
         for facet, end in zip(*np.nonzero(on_axis[:, :2]), strict=True) if block.element == "line3" else ():
             nodes = block.local[facet]
-            r1, r2 = radii[facet, [2, 1 - end]] ** 2
+            r1_squared, r2_squared = radii[facet, [2, 1 - end]] ** 2
             values[nodes[end], nodes[end]] = 0.0
-            values[nodes[end], nodes[[2, 1 - end]]] = np.array([r2, -r1]) / (r2 - r1)
+            values[nodes[end], nodes[[2, 1 - end]]] = np.array([r2_squared, -r1_squared]) / (r2_squared - r1_squared)
     return csr_array(values)
 
 

@@ -49,8 +49,8 @@ class ClosingMotion:
     primary : ndarray (n, dim)
         Primary normals [-].
     secondary : (ndarray (n, dim), Callable) or None
-        Secondary normals, and the function from a variation of the displacements (n_points, dim) [length] to theirs; None
-        if m is the normal of an obstacle.
+        Secondary normals, and the function from a variation of the displacements (n_points, dim) [length] to the variation
+        of these normals; None if m is the normal of an obstacle.
     opening : ndarray (n, dim)
         Vector o from the primary to the secondary side at the beginning of the step [length].
     length : ndarray (n,), optional
@@ -121,7 +121,7 @@ class Substitution:
         return np.asarray(np.einsum("md,md->m", vectors, self.axis)[:, None] * self.axis)
 
     def closing(self, motion: Array) -> Array:
-        """Return the slip (m, dim) by a motion (m, dim) of nodes that closes their gaps [length].
+        """Return the slip (m, dim) due to a motion (m, dim) of nodes that closes their gaps [length].
 
         On curved sides, the neighbours close their gaps along other normals, and this motion is not slip.
         """
@@ -129,7 +129,7 @@ class Substitution:
         return self.along_axis(self.secondary @ free_motion)
 
     def slip(self, closing: Array, motion: Array) -> Array:
-        """Return the slip (m, dim) by the relative `motion` (n, dim) of points [length].
+        """Return the slip (m, dim) due to the relative `motion` (n, dim) of points [length].
 
         `closing` (m, dim) is the motion of the nodes that closes their gaps [length].
         """
@@ -240,8 +240,8 @@ class LinearisedPoints:
     tests : csr_array (m, n), optional
         Weights of the points in the mean normals, if the normals of the constraints are such means.
     separate_normals : DeformedSide or Points, optional
-        The secondary side, or points whose normals are those of the constraints, if the latter are neither
-        means over the integration points nor the normals of these points.
+        The secondary side, or other points, from which the normals of the constraints are taken, if these normals are neither
+        means over the integration points nor the normals at these points.
     slips : Slips, optional
         Slips of the constraints; None without tangential constraints.
     rows_in_pair : (ndarray of int (m,), int), optional

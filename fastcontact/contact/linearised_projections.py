@@ -227,14 +227,14 @@ class SurfacePoints:
         curvature = np.einsum("nid,njd->nij", self._normal_gradient, self.axes)
         slopes = self._feet.gradient[..., None] * self.normal[:, None, None]
         tilts = [nodal_rows(self._feet.nodes, slopes[:, :, i], n_dofs) for i in axes]
-        xi = [
+        d_xi = [
             rows_of(self.motion, dual[:, i]) + sum(scaled(tilts[j], gap * metric[:, i, j]) for j in axes) for i in axes
         ]
         K = csr_array((n_dofs, n_dofs))
         for i in axes:
-            K += 2.0 * tilts[i].T @ scaled(xi[i], force)
+            K += 2.0 * tilts[i].T @ scaled(d_xi[i], force)
             for j in axes:
-                K -= xi[i].T @ scaled(xi[j], force * curvature[:, i, j])
+                K -= d_xi[i].T @ scaled(d_xi[j], force * curvature[:, i, j])
                 K -= tilts[i].T @ scaled(tilts[j], force * gap * metric[:, i, j])
         return csr_array(0.5 * (K + K.T))
 

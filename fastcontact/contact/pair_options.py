@@ -126,8 +126,8 @@ class PairOptions:
 def nodal_map(side: Surface, excluded: Mask, independent: Indices) -> csr_array:
     """Return the map (m, m) from independent to nodal values of a multiplier field, for a side with `excluded` nodes (m,).
 
-    The value at an excluded node is the mean of the values at its neighbours among the nodes `independent`. A uniform field
-    therefore remains uniform. It is zero if there are no such neighbours. All other nodal values are independent.
+    The value at an excluded node is the mean of the values at its neighbours among the nodes `independent`, so that a uniform
+    field remains uniform. The value is zero if there are no such neighbours. All other nodal values are independent.
     """
     m = len(side.points)
     if not excluded.any():

@@ -45,7 +45,7 @@ ROUNDED_FRACTION = 0.1
 # direction.
 FACING = 0.1
 Normals: TypeAlias = str | Sequence[float]
-KINDS = ("facet", "averaged", "secondary")
+NORMAL_KINDS = ("facet", "averaged", "secondary")
 
 
 @record
@@ -126,7 +126,7 @@ class Pairing:
         Whether the candidate is paired; False beyond the end of the primary surface.
     offset : ndarray (n,), optional
         Gap minus ``normal . x``, where x is the position of the candidate, for a rigid obstacle [length]; None for facets.
-    beyond : ndarray (n, dim - 1), optional
+    overhang_xi : ndarray (n, dim - 1), optional
         Overhang of the candidate beyond the end of the primary surface, in reference coordinates of the facet whose straight
         extension the candidate faces [-]; zero for other candidates, and None if no candidate overhangs.
     primary : Surface, optional
@@ -138,7 +138,7 @@ class Pairing:
     normal: Array
     paired: Mask
     offset: Array | None = None
-    beyond: Array | None = None
+    overhang_xi: Array | None = None
     primary: Surface | None = None
 
     @cached_property
@@ -160,14 +160,14 @@ class Pairing:
         assert self.primary is not None
         of_rows = np.array_equal(rows, self.rows)
         feet = self.feet if of_rows else facet_points(self.primary, self.facet[rows], self.xi[rows])
-        if self.beyond is None:
+        if self.overhang_xi is None:
             return feet
-        return replace(feet, shape=feet.shape + np.einsum("nkj,nj->nk", feet.gradient, self.beyond[rows]))
+        return replace(feet, shape=feet.shape + np.einsum("nkj,nj->nk", feet.gradient, self.overhang_xi[rows]))
 
 
 def pair(
     candidates: Array, primary: DeformedSide | RigidSide, projection_tolerance: float,
-    normals: str | Sequence[float] = "facet", obstacle: Pose | None = None, rounded: bool = False,
+    normals: str | Sequence[float] = "facet", pose: Pose | None = None, rounded: bool = False,
 ) -> Pairing:  # fmt: skip
     """Project candidates onto the closest facets of the primary side, or onto a rigid obstacle.
 
@@ -178,14 +178,14 @@ def pair(
     primary : DeformedSide or RigidSide
     projection_tolerance : float
         Largest overhang beyond the end of the primary surface at which a candidate is paired, in facet lengths [-]
-        (TOLE_PROJ_EXT of code_aster). It then faces the straight extension of the facet, so that the forces on both
-        sides have the same line of action, and their moments are in equilibrium.
+        (TOLE_PROJ_EXT of code_aster). An overhanging candidate faces the straight extension of the facet, so that the
+        forces on both sides have the same line of action, and their moments are in equilibrium.
     normals : str or sequence of float
         ``"facet"`` for the normals of facets, a unit vector (dim,) for this normal everywhere, or any other string for
         normals interpolated between averaged nodal normals, which are continuous except at corners. Unless they are
         ``"facet"`` normals, candidates are projected along them.
-    obstacle : Pose, optional
-        Position and rotation of a rigid obstacle.
+    pose : Pose, optional
+        Position and rotation of a rigid obstacle; by default its initial ones.
     rounded : bool
         Whether the normals of facets vary continuously across edges.
 
@@ -199,7 +199,7 @@ def pair(
         If a projection does not converge; see `projection.closest`.
     """
     if isinstance(primary, RigidSide):
-        pose = Pose(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
+        pose = Pose(np.zeros(candidates.shape[1])) if pose is None else pose
         _, normal, paired, offset = primary.project(candidates, pose)
         no_facet = np.zeros(len(candidates), np.intp)
         return Pairing(no_facet, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
@@ -248,15 +248,15 @@ def _round_edges(primary: DeformedSide, facet: Indices, xi: Array, mean: Array) 
 
 
 def _with_overhang(pairing: Pairing, candidates: Array, primary: DeformedSide, overhangs: Mask) -> Pairing:
-    """Return the pairing with the overhang, `Pairing.beyond`, of the candidates that the mask `overhangs` (n,) marks."""
+    """Return the pairing with the `overhang_xi` of the candidates that the mask `overhangs` (n,) marks."""
     rows = np.flatnonzero(overhangs)
     feet = facet_points(primary.surface, pairing.facet[rows], pairing.xi[rows])
     nodes = primary.coordinates[feet.nodes]
     offset = candidates[rows] - np.einsum("nk,nkd->nd", feet.shape, nodes)
     basis = np.concatenate([np.einsum("nkj,nkd->ndj", feet.gradient, nodes), pairing.normal[rows][:, :, None]], axis=2)
-    beyond = np.zeros_like(pairing.xi)
-    beyond[rows] = np.linalg.solve(basis, offset[:, :, None])[:, :-1, 0]
-    return replace(pairing, beyond=beyond)
+    overhang_xi = np.zeros_like(pairing.xi)
+    overhang_xi[rows] = np.linalg.solve(basis, offset[:, :, None])[:, :-1, 0]
+    return replace(pairing, overhang_xi=overhang_xi)
 
 
 def _at_smooth_ends(primary: DeformedSide, closest: Closest) -> Mask:
@@ -319,7 +319,7 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     mean = mean / length if length > LENGTH_ROUND_OFF * len(normal) else np.array([0.0, 0.0, 1.0])
     axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
     axis /= np.linalg.norm(axis)
-    if held is not None:  # otherwise the sign of the principal axes below could be round-off
+    if held is not None:  # with an arbitrary first axis, round-off could determine the sign of the principal axes below
         in_plane = np.eye(3) - np.outer(mean, mean)
         size, vectors = np.linalg.eigh(in_plane @ held.sum(axis=0) @ in_plane)
         axis = vectors[:, -1] if size[-1] > LENGTH_ROUND_OFF * len(held) else axis
@@ -362,7 +362,7 @@ def relative_motion(candidates: Candidates, pairing: Pairing, n_points: int) -> 
 
 
 def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSide) -> str | tuple[float, ...]:
-    """Return a key of `KINDS`, or a unit vector (dim,); `points` (n_points, dim) are reference coordinates [length].
+    """Return one of NORMAL_KINDS, or a unit vector (dim,); `points` (n_points, dim) are reference coordinates [length].
 
     Raises
     ------
@@ -372,14 +372,15 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     """
     dim = points.shape[1]
     if isinstance(normals, str):
-        if normals not in KINDS:
-            raise ContactError(unknown("kind of normals", normals, [*KINDS, "a vector"]))
+        if normals not in NORMAL_KINDS:
+            raise ContactError(unknown("kind of normals", normals, [*NORMAL_KINDS, "a vector"]))
         result: str | tuple[float, ...] = normals
     else:
         vector = np.asarray(normals, float)
         length = np.linalg.norm(vector)
         if vector.shape != (dim,) or not (np.isfinite(length) and length > 0):
-            raise ContactError(f"normals = {normals!r} must be one of {', '.join(KINDS)}, or a vector of {dim} numbers")
+            kinds = ", ".join(NORMAL_KINDS)
+            raise ContactError(f"normals = {normals!r} must be one of {kinds}, or a vector of {dim} numbers")
         result = tuple((vector / length).tolist())
         if (
             isinstance(primary, Surface)

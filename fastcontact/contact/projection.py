@@ -349,8 +349,8 @@ def along_normals(
     relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in surface.blocks]
     normals_and_nodes = zip(np.split(normals, surface.offsets[1:-1]), nodes_of_blocks, strict=True)
     normals_of_blocks = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in normals_and_nodes]
-    terms, directions = _polynomials(nodes_of_blocks), _polynomials(normals_of_blocks)
-    arguments = relative_points, heights, terms, directions, surface.triangular, surface.neighbours, projection
+    positions, directions = _polynomials(nodes_of_blocks), _polynomials(normals_of_blocks)
+    arguments = relative_points, heights, positions, directions, surface.triangular, surface.neighbours, projection
     parallel_map(lambda span: projection_kernels.along_normals(*span, *arguments), portions(len(points)))
     return projection
 

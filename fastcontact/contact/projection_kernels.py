@@ -47,9 +47,10 @@ def angles(nodes, n_corners, out):
 
 @interpretable_kernel
 def coefficients(values, to_terms, first, begin, end, out):
-    """Fill rows ``first + begin`` to ``first + end - 1`` of `out` (n_facets, width, 3) with the terms of `values` (n, m, 3).
+    """Fill rows ``first + begin`` to ``first + end - 1`` of `out` (n_facets, width, 3) with polynomial coefficients.
 
-    `to_terms` (m, m) are those of `facet_tables.Tables`.
+    They interpolate the `values` (n, m, 3) at the nodes of the facets `begin` to ``end - 1``. `to_terms` (m, m) are those of
+    `facet_tables.Tables`.
     """
     m = values.shape[1]
     for f in range(begin, end):
@@ -62,23 +63,24 @@ def coefficients(values, to_terms, first, begin, end, out):
 
 
 @innermost_kernel
-def _interpolated(terms, f, s, t):
-    """Return the value of the polynomials of facet `f` at (s, t), and their derivatives."""
-    x, xs, xt, _, _, _ = component(terms, f, 0, s, t)
-    y, ys, yt, _, _, _ = component(terms, f, 1, s, t)
-    z, zs, zt, _, _, _ = component(terms, f, 2, s, t)
+def _interpolated(polynomials, f, s, t):
+    """Return the values at (s, t) of the `polynomials` of facet `f`, and their derivatives."""
+    x, xs, xt, _, _, _ = component(polynomials, f, 0, s, t)
+    y, ys, yt, _, _, _ = component(polynomials, f, 1, s, t)
+    z, zs, zt, _, _, _ = component(polynomials, f, 2, s, t)
     return (x, y, z), (xs, ys, zs), (xt, yt, zt)
 
 
 @innermost_kernel
-def _newton(point, terms, directions, f, s, t, height):
+def _newton(point, positions, directions, f, s, t, height):
     """Return the solution (s, t) of ``X(s, t) + height n(s, t) = point`` on the extended facet `f`, and whether it converged.
 
-    X is the position and n the interpolated normal. The arguments (s, t) and `height` are the initial guess.
+    X is the position and n the interpolated normal, with the coefficients `positions` and `directions`, see `along_normals`.
+    The arguments (s, t) and `height` are the initial guess.
     """
     step = np.inf
     for _ in range(MAX_ITERATIONS):
-        foot, along_s, along_t = _interpolated(terms, f, s, t)
+        foot, along_s, along_t = _interpolated(positions, f, s, t)
         normal, turn_s, turn_t = _interpolated(directions, f, s, t)
         residual = minus(point, plus_multiple(foot, normal, height))
         p, q = plus_multiple(along_s, turn_s, height), plus_multiple(along_t, turn_t, height)
@@ -100,14 +102,14 @@ def _newton(point, terms, directions, f, s, t, height):
 
 @innermost_kernel
 def overhang_of(triangle, s, t):
-    """Return how far reference coordinates lie outside a facet, in facet lengths; 0 inside."""
+    """Return how far reference coordinates lie outside a facet, a `triangle` or a quadrangle, in facet lengths; 0 inside."""
     outside = max(-s, -t, s + t - 1.0) if triangle else 0.5 * (max(abs(s), abs(t)) - 1.0)
     return max(outside, 0.0)
 
 
 @innermost_kernel
 def clamped(triangle, s, t):
-    """Return reference coordinates moved into a facet, independently of the choice of its first corner."""
+    """Return reference coordinates moved into a `triangle` or quadrangle, independently of the choice of a first corner."""
     if triangle:
         a, b, c = max(s, 0.0), max(t, 0.0), max(1.0 - s - t, 0.0)
         total = a + b + c if min(s, t, 1.0 - s - t) < 0.0 else 1.0
@@ -116,7 +118,7 @@ def clamped(triangle, s, t):
 
 
 @innermost_kernel
-def _distance_beyond(terms, triangle, f, s, t, length):
+def _distance_beyond(positions, triangle, f, s, t, length):
     """Return the distance, divided by `length`, between facet `f` and a projection (s, t) onto the extended facet.
 
     Neighbours are compared by this distance, because overhangs depend on the shapes of facets. If two facets are closest at a
@@ -127,31 +129,31 @@ def _distance_beyond(terms, triangle, f, s, t, length):
     else:
         total = 0.5 * (max(abs(s) - 1.0, 0.0) + max(abs(t) - 1.0, 0.0))
     a, b = clamped(triangle, s, t)
-    offset = minus(_interpolated(terms, f, s, t)[0], _interpolated(terms, f, a, b)[0])
+    offset = minus(_interpolated(positions, f, s, t)[0], _interpolated(positions, f, a, b)[0])
     return np.sqrt(dot(offset, offset)) / length + 1e-3 * total
 
 
 @innermost_kernel
-def _closest_neighbour(point, terms, directions, triangular, neighbours, f, height, length):
+def _closest_neighbour(point, positions, directions, triangular, neighbours, f, height, length):
     """Return the neighbour of facet `f` with the smallest `_distance_beyond`, (s, t) of the projection, and this distance.
 
-    The distance is infinite if no projection converges.
+    The distance is infinite if no projection converges. For the arguments, see `along_normals` and `_distance_beyond`.
     """
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
     for k in range(start[f], start[f + 1]):
         g = numbers[k]
         middle = 1.0 / 3.0 if triangular[g] else 0.0
-        s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
-        distance = _distance_beyond(terms, triangular[g], g, s, t, length) if converged else np.inf
-        # If facets are equivalent, the first one is chosen.
+        s, t, converged = _newton(point, positions, directions, g, middle, middle, height)
+        distance = _distance_beyond(positions, triangular[g], g, s, t, length) if converged else np.inf
+        # Of equally close facets, the first one is chosen.
         if converged and max(distance, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
             best, best_s, best_t, least = g, s, t, distance
     return best, best_s, best_t, least
 
 
 @interpretable_kernel
-def along_normals(begin, end, points, heights, terms, directions, triangular, neighbours, projection):
+def along_normals(begin, end, points, heights, positions, directions, triangular, neighbours, projection):
     """Project points `begin` to ``end - 1`` along interpolated normals; see `projection.along_normals`.
 
     Parameters
@@ -161,31 +163,32 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
         Positions [length].
     heights : ndarray (n,)
         Heights of the points over their closest points [length].
-    terms, directions : ndarray (n_facets, m, 3)
+    positions, directions : ndarray (n_facets, m, 3)
         Coefficients of positions [length] and of normals [-].
     triangular : ndarray of bool (n_facets,)
         Whether each facet is a triangle.
     neighbours : (ndarray of int (n_facets + 1,), ndarray of int)
         Offsets and numbers of the facets that share a node with each facet, see `Surface.neighbours`.
     projection : tuple of ndarray
-        facet (n,), xi (n, 2) [-], overhang (n,) [-]: closest points, changed in place; and unit normals (n, 3), filled.
+        The facet (n,), xi (n, 2) and overhang (n,) of the closest points [-], changed in place, and an array (n, 3) that is
+        filled with unit normals.
     """
     facet, xi, overhang, normal = projection
     for i in range(begin, end):
         point, f = (points[i, 0], points[i, 1], points[i, 2]), facet[i]
-        s, t, over = xi[i, 0], xi[i, 1], overhang[i]
-        a, b, converged = _newton(point, terms, directions, f, s, t, heights[i])
+        s, t, outside = xi[i, 0], xi[i, 1], overhang[i]
+        a, b, converged = _newton(point, positions, directions, f, s, t, heights[i])
         new_overhang = overhang_of(triangular[f], a, b)
         if converged and new_overhang <= LARGEST_OVERHANG:
-            s, t, over = a, b, new_overhang
+            s, t, outside = a, b, new_overhang
             if new_overhang > LENGTH_ROUND_OFF:
-                edge = _interpolated(terms, f, s, t)[1]
+                edge = _interpolated(positions, f, s, t)[1]
                 length = np.sqrt(dot(edge, edge))
                 next_facet, a, b, distance = _closest_neighbour(
-                    point, terms, directions, triangular, neighbours, f, heights[i], length
+                    point, positions, directions, triangular, neighbours, f, heights[i], length
                 )
-                if distance < _distance_beyond(terms, triangular[f], f, s, t, length):
-                    f, s, t, over = next_facet, a, b, overhang_of(triangular[next_facet], a, b)
+                if distance < _distance_beyond(positions, triangular[f], f, s, t, length):
+                    f, s, t, outside = next_facet, a, b, overhang_of(triangular[next_facet], a, b)
         s, t = clamped(triangular[f], s, t)
-        facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > LENGTH_ROUND_OFF else 0.0
+        facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, outside if outside > LENGTH_ROUND_OFF else 0.0
         normal[i, 0], normal[i, 1], normal[i, 2] = unit(_interpolated(directions, f, s, t)[0])

@@ -27,7 +27,7 @@ def nodes_with_prescribed_gap(sides: ContactSides, config: Configuration) -> Mas
     """Return the nodes (n_nodes,) at which supports and multi-point constraints prescribe the gap.
 
     The contact forces of such nodes act between supports. On non-matching meshes, their gaps may also depend on unrestrained
-    primary nodes, but not on secondary nodes, and the constraints are nearly redundant.
+    primary nodes. As they do not depend on secondary nodes, the constraints are then nearly redundant.
     """
     motions, points = sides.held_motions, sides.secondary.points
     prescribed = np.zeros(len(points), bool)
@@ -59,8 +59,8 @@ def nodes_with_undetermined_traction(sides: ContactSides, config: Configuration)
     if sides.options.penalty is not None:
         normal = np.zeros_like(normal)
     if sides.options.kind != "tied":
-        since_begin = replace(config, start=np.zeros_like(config.displacement))
-        tangential = _held_without_motion(sides, since_begin) if sides.friction else np.zeros_like(held_both)
+        from_undeformed = replace(config, start=np.zeros_like(config.displacement))
+        tangential = _held_without_motion(sides, from_undeformed) if sides.friction else np.zeros_like(held_both)
     # Projector that removes the tangential directions in which the complete side is held.
     remaining = np.eye(held_both.shape[1]) - eigenspaces(tangential.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
     normal, tangential = (held - without_complete_facets(held, sides.secondary) for held in (normal, tangential))
@@ -111,8 +111,8 @@ def _held_without_motion(sides: ContactSides, config: Configuration) -> Array:
         rows, feet, held_primary = pairing.rows, pairing.feet, motions.projectors_at(pairing.feet.nodes)
         motion = (config.displacement - config.start)[feet.nodes]
         mean = np.einsum("nk,nkd->nd", feet.shape, motion)
-        # The point opposite to a held node may lie slightly off the held primary node, if the normal is inclined. The
-        # motion of the other nodes of this facet is then ignored.
+        # If the normal is inclined, the point opposite a held node may lie slightly off the held primary node. The motion of
+        # the other nodes of this primary facet is then ignored.
         excess = np.einsum("nk,nkde,nkd->ne", feet.shape, held_primary, motion - mean[:, None])
         slip[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
         common = eigenspaces(common @ held_opposite @ common, 0.5)

@@ -120,10 +120,11 @@ class Smoothing:
 
 
 def frames(side: Surface, points: Array, coordinates: Array) -> Array:
-    """Return convected tangents (n_facets, dim - 1, dim) at the centres of facets, of unit length in the reference.
+    """Return convected tangents (n_facets, dim - 1, dim) at the centres of facets.
 
-    In the reference, at `points` (n_points, dim), the first tangent points to the first corner. Tangents follow the mean
-    deformation of a facet to `coordinates` (n_points, dim), so that all corners have the same influence.
+    In the reference configuration, at `points` (n_points, dim), they are unit vectors, the first of which points to the first
+    corner. Tangents follow the mean deformation of a facet to `coordinates` (n_points, dim), so that all corners have the
+    same influence.
     """
     frames_of_blocks = []
     for block in side.blocks:
@@ -293,12 +294,12 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit, error: Array) -> tu
     height, no smooth surface fits the nodes, and the heights are zero.
     """
     element, k = elements.get(block.element), smooth.powers[0].max() + 1
-    (xi, powers), (corners, _) = _lattice(element, k), smooth.in_planes(points[block.facets])
+    (xi, powers), (nodes, _) = _lattice(element, k), smooth.in_planes(points[block.facets])
     shape = element.shape(xi)
-    height = smooth.height(np.einsum("qk,nke->nqe", shape, corners)) - smooth.height(corners) @ shape.T
+    height = smooth.height(np.einsum("qk,nke->nqe", shape, nodes)) - smooth.height(nodes) @ shape.T
     threshold = np.where(error > np.abs(height).max(axis=1), np.inf, LENGTH_ROUND_OFF)
     height = smooth.size[:, None] * np.where(np.abs(height) > threshold[:, None], height, 0.0)
-    heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
+    heights = np.zeros((len(nodes), k, k if element.dim == 2 else 1))
     heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
     curvature = smooth.slope_and_curvature()[1]
     curvature = np.where(np.abs(curvature) > LENGTH_ROUND_OFF, curvature, 0.0) / smooth.size[:, None, None]

@@ -42,8 +42,8 @@ class TiedPair:
     ----------
     moments : csr_array (q, m)
         Matrix from the gaps at the m constraint points of the formulation to the q weighted gaps of the equations [-].
-    directions : tuple of ndarray (m, dim)
-        Tangents [-].
+    directions : tuple of k ndarray (m, dim)
+        Unit tangents [-].
     areas : ndarray (q,), optional
         Integrals of the test functions of the equations [area].
     reduction : csr_array (q dim, q dim), optional

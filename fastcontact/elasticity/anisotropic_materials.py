@@ -20,7 +20,7 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
 
 # Pairs of material axes to which Poisson's ratios and shear moduli belong.
-NAMES = ("12", "13", "23")
+AXIS_PAIRS = ("12", "13", "23")
 # Largest difference between symmetric entries of the matrix of moduli, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-9
 
@@ -86,7 +86,7 @@ class Orthotropic(Material):
             check_type(f"{name} of Orthotropic", getattr(self, name), Any, ModelError)
         for name in ("E", "nu", "G"):
             object.__setattr__(self, name, _three_constants(name, getattr(self, name)))
-        names = [f"Young's modulus E{axis}" for axis in "123"] + [f"the shear modulus G{pair}" for pair in NAMES]
+        names = [f"Young's modulus E{axis}" for axis in "123"] + [f"the shear modulus G{pair}" for pair in AXIS_PAIRS]
         for name, modulus in zip(names, (*self.E, *self.G), strict=True):
             if not isinstance(modulus, Varying):
                 check_positive(name, modulus)
@@ -306,7 +306,7 @@ def _determinant(nu: Sequence[Any], reciprocal: Sequence[Any]) -> Any:
 
 def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
     """Raise ModelError if the strain energy is not positive definite for these Poisson's ratios."""
-    for value, pair, (i, j) in zip(nu, NAMES, ((0, 1), (0, 2), (1, 2)), strict=True):
+    for value, pair, (i, j) in zip(nu, AXIS_PAIRS, ((0, 1), (0, 2), (1, 2)), strict=True):
         limit = math.sqrt(E[i] / E[j])
         if not abs(value) < limit:
             raise ModelError(

@@ -6,6 +6,9 @@ consists of integrals of dN/dX . A . dN/dX (Bonet and Wood, 2008, chapter 9). At
 is the trace of the strain, and F denotes the displacement gradient, because the differences F - I and J - 1 would add
 round-off to small strains. With thermal expansion, F is the elastic part of the deformation gradient, relative to the
 stress-free intermediate configuration (Lu and Pister, 1975).
+
+Shared arguments: ``finite`` states whether strains are finite; ``bulk`` is a bulk modulus [pressure]. ``constants``, D, F, P,
+A, ``old`` and ``new`` are described in `constitutive_kernels`, ``slots``, ``owner`` and ``part`` in `element_2d_kernels`.
 """
 
 import numpy as np
@@ -23,7 +26,7 @@ from fastcontact.elasticity.constitutive_kernels import (
     sum_products,
     voigt,
 )
-from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
+from fastcontact.elasticity.dilatation_kernels import back_substitute, forward_substitute
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, find_owned
 from fastcontact.elasticity.element_3d_kernels import add_block
 from fastcontact.elasticity.tile_product import tile
@@ -212,7 +215,7 @@ def _elastic_tangent(constants, D, bulk, plane_stress):
     """Return A (24, 12) for elastic small strains, without the projected dilatation."""
     no_history, new, P, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.zeros((24, 12))
     F, G = np.zeros((3, 3)), np.empty((3, 3))
-    finite, tangent, geometric = np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
+    finite, tangent, geometric = np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see `_solve_plane_stress`
     dilatation = _dilatation(F, finite, G)
     _evaluate_point(
         constants, D, bulk, 0.0, 0.0, plane_stress, finite, geometric, tangent, F, dilatation, G, no_history, new, P, elastic
@@ -268,7 +271,7 @@ def _project(polynomials, volume, gradient, dim, dilatation, G, factors, mass, p
             _weigh(G, 3 * q, weight, dim, factors, 3 * q)
         if len(slopes):
             _integrate(factors, gradient, slopes, 4 * k)
-    reduce(mass, projected)
+    forward_substitute(mass, projected)
     for k in range(m if len(slopes) else 0):
         for n in range(k):
             for i in range(4):

@@ -9,7 +9,7 @@ variables at the beginning and the end of the load step: the plastic strain (xx,
 components), the equivalent plastic strain, the plastic work [energy / volume], and in plane stress F_zz - 1. At finite
 strains, L - I takes the place of the plastic strain, where L is the lower triangular factor of the inverse plastic metric,
 C_p^-1 = L L^T. For laws that have a bulk modulus, `evaluate_law` adds the volumetric part of P and A, and the element loop
-adds that of the energy, U(J) = K (J - 1)^2 / 2.
+adds that of the energy, U(J) = K (J - 1)^2 / 2. ``tangent`` states whether A is computed.
 """
 
 import numpy as np
@@ -464,7 +464,7 @@ def _second_invariant(C01, I1, scale, F, J, G, factor, d2J_factor, tangent, P, A
 
 @kernel
 def _ogden(constants, F, tangent, P, A):
-    """Apply Ogden's law of the isochoric stretches; return the energy density.
+    """Apply Ogden's law of the isochoric principal stretches; return the energy density.
 
     The energy is the sum of 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) (Ogden, 1972); the moduli in principal axes
     are those of Simo and Taylor (1991, equation 2.28).

@@ -169,7 +169,7 @@ class System(ConstrainedMotion):
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
             diagonal = transformed.diagonal()
-            # The transformed diagonal without the contribution of off-diagonal terms of K, which may cancel the others.
+            # The diagonal without the contribution of off-diagonal terms of K, which may cancel that of the diagonal terms.
             magnitude = self.T.multiply(self.T).T @ diagonal_of_K
             # Points without stiffness that constraints couple only with each other are excluded from the unknowns.
             self.free &= (magnitude > 0.0) | self._without_stiffness

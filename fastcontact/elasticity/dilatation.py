@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fastcontact.arrays import Array
 from fastcontact.elasticity.energy import cell_volumes
-from fastcontact.elasticity.incompatible_modes import BENDING, MODES
+from fastcontact.elasticity.incompatible_modes import ELEMENTS_WITH_MODES, MODES
 from fastcontact.mesh import elements
 
 # Mask of the moduli with a mean dilatation, or the codes of `MaterialField.treatment`.
@@ -55,11 +55,11 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
         From `LinearElastic.moduli` [pressure].
     averaged : ndarray of bool or uint8 (n_materials,), optional
         Mask of the materials with a mean dilatation, or the codes of `MaterialField.treatment`, of which 1 and, for elements
-        not in `BENDING`, 3 stand for a mean dilatation. By default, there are no such materials.
+        not in `ELEMENTS_WITH_MODES`, 3 stand for a mean dilatation. By default, there are no such materials.
     """
     if averaged is not None:
         treatment = np.asarray(averaged).astype(np.uint8)
-        averaged = (treatment == 1) | ((treatment == 1 + MODES) & (name not in BENDING))
+        averaged = (treatment == 1) | ((treatment == 1 + MODES) & (name not in ELEMENTS_WITH_MODES))
     if averaged is None or not averaged.any() or elements.get(name).dilatation is None:
         return None
     bulk = np.where(averaged, moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0, 0.0)

@@ -55,8 +55,8 @@ def _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mas
 
 
 @kernel
-def reduce(mass, g):
-    """Replace the lower triangle of `mass` (m, m) by its Cholesky factor L, and `g` (m, n) by L^-1 g."""
+def forward_substitute(mass, g):
+    """Replace the lower triangle of `mass` (m, m) by its Cholesky factor L, and then `g` (m, n) by L^-1 g."""
     for m in range(mass.shape[0]):
         for n in range(m + 1):
             value = mass[m, n]
@@ -119,13 +119,13 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g)
-        reduce(mass, g)
+        forward_substitute(mass, g)
         add_products(factors, g, slots, c, in_part, row, data)
 
 
 @kernel
 def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, displacement, basis_out, out):
-    """Add the moduli times the projected dilatation to the normal stresses in `out` (n_cells, n_out, n_components).
+    """Add the bulk moduli times the projected dilatation to the normal stresses in `out` (n_cells, n_out, n_components).
 
     `displacement` (n_points, dim) [length] contains the displacements, and `basis_out` (n_out, m) [-] the polynomials at the
     points of `out` [pressure].
@@ -147,7 +147,7 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
         for m in range(size):
             for k in range(n_nodes * dim):
                 moment[m, 0] += g[m, k] * u[k // dim, k % dim]
-        reduce(mass, moment)
+        forward_substitute(mass, moment)
         for m in range(size):
             coefficient[m] = moment[m, 0] * (bulk_mean if m == 0 else bulk_remainder)
         back_substitute(mass, coefficient)

@@ -4,7 +4,8 @@
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
 (xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect, and are arguments because the
-loops of both dimensions are called in the same way.
+loops of both dimensions are called in the same way. In helpers, ``slots`` and ``in_part`` are those of `add_stiffness` and
+`find_owned`, and ``flat`` is the matrix ``data`` as a vector.
 """
 
 import numpy as np
@@ -26,7 +27,10 @@ def _gather(values, cells, c, x):
 
 @kernel
 def map_3d(x, slopes, q, gradient):
-    """Fill `gradient` (3, n_nodes) with shape derivatives in x, y, z; return det J."""
+    """Fill `gradient` (3, n_nodes) with shape derivatives in x, y, z at point q; return det J.
+
+    `x` (3, n_nodes) are the positions of the nodes, and `slopes` (n_q, 3, n_nodes) the derivatives dN, see `transposed`.
+    """
     j00, j01, j02, j10, j11, j12, j20, j21, j22 = jacobian_3d(x, slopes, q)
     c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
     det = j00 * c00 + j01 * c01 + j02 * c02

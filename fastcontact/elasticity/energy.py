@@ -9,8 +9,8 @@ from fastcontact.mesh import quadrature
 from fastcontact.mesh.elements import Element
 
 
-def elastic_energy(stress: Array, compliance: Array) -> Array:
-    """Return ``stress : strain``, twice the elastic energy density, at points of cells (n_cells, n) [pressure].
+def twice_energy_density(stress: Array, compliance: Array) -> Array:
+    """Return twice the elastic energy density, ``stress : strain``, at points of cells (n_cells, n) [pressure].
 
     Parameters
     ----------

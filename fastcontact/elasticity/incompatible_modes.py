@@ -19,11 +19,11 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.mesh import elements
 
 # Elements that support incompatible modes.
-BENDING = ("quad4", "hex8")
+ELEMENTS_WITH_MODES = ("quad4", "hex8")
 # Bit of the codes of `MaterialField.treatment` that selects the modes.
 MODES = 2
-# Number of the stress component (i, j).
-PAIRS = {2: np.array([[0, 3], [3, 1]]), 3: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])}
+# Voigt number of the stress component (i, j), by the dimension of the mesh.
+VOIGT = {2: np.array([[0, 3], [3, 1]]), 3: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])}
 
 
 class Tables(NamedTuple):
@@ -35,22 +35,22 @@ class Tables(NamedTuple):
         Derivatives of the shape functions at the quadrature points, these points, and their weights [-].
     middle : ndarray (1, n_nodes, dim)
         Derivatives of the shape functions at the centre of the cell [-].
-    pairs : ndarray of int (dim, dim)
-        Number of the stress component (i, j).
+    voigt : ndarray of int (dim, dim)
+        Voigt number of the stress component (i, j).
     """
 
     dN: Array
     xi: Array
     weights: Array
     middle: Array
-    pairs: Indices
+    voigt: Indices
 
 
 def tables(name: str) -> Tables:
     """Return the constants of the element type `name`."""
     element = elements.get(name)
     _, dN, weights = element.tables
-    return Tables(dN, element.quadrature[0], weights, element.gradient(np.zeros((1, element.dim))), PAIRS[element.dim])
+    return Tables(dN, element.quadrature[0], weights, element.gradient(np.zeros((1, element.dim))), VOIGT[element.dim])
 
 
 def with_modes(name: str, treatment: AnyArray | None) -> Mask | None:
@@ -58,7 +58,7 @@ def with_modes(name: str, treatment: AnyArray | None) -> Mask | None:
 
     None is returned if the element type does not support these modes, or no material uses them.
     """
-    if treatment is None or name not in BENDING:
+    if treatment is None or name not in ELEMENTS_WITH_MODES:
         return None
     has_modes = (np.asarray(treatment).astype(np.uint8) & MODES) > 0
     return has_modes if has_modes.any() else None

@@ -3,7 +3,7 @@
 
 Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``dN`` (n_q, n_nodes, dim), ``xi`` (n_q,
 dim) and ``weights`` (n_q,) of the quadrature; ``middle`` (1, n_nodes, dim), shape derivatives at the centre of the reference
-cell; ``pairs`` (dim, dim), the number of the stress component (i, j); ``moduli`` (n_moduli, n_components, n_components)
+cell; ``voigt`` (dim, dim), the Voigt number of the component (i, j); ``moduli`` (n_moduli, n_components, n_components)
 [pressure]; ``with_modes`` (n_moduli,) of bool, the mask of moduli with modes; ``material`` (n_cells, 1 or n_q), the rows of
 moduli for cells, or for their quadrature points. There are 4 modes if dim is 2, and 13 modes if dim is 3.
 
@@ -15,16 +15,17 @@ sum w M^T D B. Static condensation eliminates the amplitudes of the modes, a = -
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.elasticity.dilatation_kernels import add_products, back_substitute, reduce
+from fastcontact.elasticity.dilatation_kernels import add_products, back_substitute, forward_substitute
 from fastcontact.elasticity.element_2d_kernels import find_owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
 
 @kernel
-def _modes(xi, q, inverse, ratio, pairs, M):
+def _modes(xi, q, inverse, ratio, voigt, M):
     """Fill `M` (n_components, n_modes) with the strains due to unit modes at point q.
 
-    `inverse` (dim, dim) is the inverse Jacobian at the centre, and `ratio` its determinant divided by that at the point.
+    `inverse` (dim, dim) is the inverse Jacobian at the centre, and `ratio` is det J at the centre divided by det J at the
+    point.
     """
     dim = xi.shape[1]
     M[:] = 0.0
@@ -32,7 +33,7 @@ def _modes(xi, q, inverse, ratio, pairs, M):
         for j in range(dim):
             slope = -2.0 * ratio * xi[q, k] * inverse[j, k]
             for i in range(dim):
-                M[pairs[i, j], dim * k + i] += slope
+                M[voigt[i, j], dim * k + i] += slope
     if dim == 3:
         for i in range(3):
             M[i, 9] = ratio * xi[q, 0] * xi[q, 1]
@@ -42,8 +43,11 @@ def _modes(xi, q, inverse, ratio, pairs, M):
 
 
 @kernel
-def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, modal, mixed):
-    """Fill `modal` (n_modes, n_modes) and `mixed` (n_modes, n_nodes * dim) of the cell with the nodes `x` (n_nodes, dim)."""
+def _integrate(x, dN, xi, weights, middle, voigt, moduli, rows, modal, mixed):
+    """Fill `modal` (n_modes, n_modes) and `mixed` (n_modes, n_nodes * dim) of the cell with the nodes `x` (n_nodes, dim).
+
+    `rows` (1 or n_q,) are the rows of moduli for the cell or for its quadrature points.
+    """
     dim, n_modes = x.shape[1], modal.shape[0]
     J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     M, S = np.empty((moduli.shape[1], n_modes)), np.empty((moduli.shape[1], n_modes))
@@ -53,8 +57,8 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, modal, mixed)
     mixed[:] = 0.0
     for q in range(weights.shape[0]):
         det = inverse_jacobian(x, dN, q, J, inverse)
-        _modes(xi, q, at_middle, middle_det / det, pairs, M)
-        D = moduli[numbers[q % numbers.shape[0]]]
+        _modes(xi, q, at_middle, middle_det / det, voigt, M)
+        D = moduli[rows[q % rows.shape[0]]]
         for c in range(M.shape[0]):
             for m in range(n_modes):
                 S[c, m] = 0.0
@@ -73,12 +77,12 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, modal, mixed)
             for i in range(dim):
                 for j in range(dim):
                     for m in range(n_modes):
-                        mixed[m, dim * a + i] += S[pairs[i, j], m] * gradient[a, j]
+                        mixed[m, dim * a + i] += S[voigt[i, j], m] * gradient[a, j]
 
 
 @kernel
 def subtract_stiffness(
-    points, cells, dN, xi, weights, middle, pairs, moduli, with_modes, material, slots, owner, part, data
+    points, cells, dN, xi, weights, middle, voigt, moduli, with_modes, material, slots, owner, part, data
 ):
     """Subtract the stiffness of condensed modes from `data` (n_blocks, dim, dim), in the rows of nodes that `part` owns.
 
@@ -93,14 +97,14 @@ def subtract_stiffness(
         if not with_modes[material[c, 0]] or not find_owned(cells, c, owner, part, in_part):
             continue
         at_nodes(points, cells, c, x)
-        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)
-        reduce(modal, mixed)
+        _integrate(x, dN, xi, weights, middle, voigt, moduli, material[c], modal, mixed)
+        forward_substitute(modal, mixed)
         add_products(factors, mixed, slots, c, in_part, row, data)
 
 
 @kernel
 def add_stress(
-    points, cells, dN, xi, weights, middle, pairs, moduli, with_modes, material, displacement, subtracted, xi_out, dN_out,
+    points, cells, dN, xi, weights, middle, voigt, moduli, with_modes, material, displacement, subtracted, xi_out, dN_out,
     interpolation, out,
 ):  # fmt: skip
     """Add the stresses due to the modes to `out` (n_cells, n_out, n_components), in place.
@@ -122,7 +126,7 @@ def add_stress(
             continue
         at_nodes(points, cells, c, x)
         at_nodes(displacement, cells, c, u)
-        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)
+        _integrate(x, dN, xi, weights, middle, voigt, moduli, material[c], modal, mixed)
         middle_det = inverse_jacobian(x, middle, 0, J, at_middle)
         for m in range(n_modes):
             force[m, 0] = 0.0
@@ -131,15 +135,15 @@ def add_stress(
         if subtracted.shape[0]:
             for q in range(weights.shape[0]):
                 det = inverse_jacobian(x, dN, q, J, inverse)
-                _modes(xi, q, at_middle, middle_det / det, pairs, M)
+                _modes(xi, q, at_middle, middle_det / det, voigt, M)
                 for e in range(size):
                     for m in range(n_modes):
                         force[m, 0] += det * weights[q] * M[e, m] * subtracted[c, q, e]
-        reduce(modal, force)
+        forward_substitute(modal, force)
         back_substitute(modal, force[:, 0])
         for k in range(xi_out.shape[0]):
             det = inverse_jacobian(x, dN_out, k, J, inverse)
-            _modes(xi_out, k, at_middle, middle_det / det, pairs, M)
+            _modes(xi_out, k, at_middle, middle_det / det, voigt, M)
             for e in range(size):
                 strain[e] = 0.0
                 for m in range(n_modes):

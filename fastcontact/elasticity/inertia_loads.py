@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.elasticity.loads import DensityField, Table, VolumeLoad, add_density, measured_points, solid_rows
+from fastcontact.elasticity.loads import DensityField, Table, VolumeLoad, add_forces, quadrature_points, solid_rows
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.errors import ModelError
@@ -61,10 +61,10 @@ class InertiaLoad(VolumeLoad):
         forces, missing = np.zeros((mesh.n_points, mesh.dim)), 0
         for element, rows in solid_rows(mesh, self.groups).items():
             cells = mesh.cells[element][rows]
-            x, N, volume = measured_points(mesh, element, cells, kinematics)
+            x, N, volume = quadrature_points(mesh, element, cells, kinematics)
             densities = np.full(volume.shape, np.nan) if density is None else density.at(element, rows, N)
             missing += int(np.isnan(densities).any(axis=1).sum())
-            add_density(forces, cells, N, self.acceleration(x, kinematics) * (volume * densities)[:, :, None])
+            add_forces(forces, cells, N, self.acceleration(x, kinematics) * (volume * densities)[:, :, None])
         if missing:
             raise ModelError(
                 f"{self.name} needs densities, but the materials of {missing} solid cells have none: give them density=..., "

@@ -107,17 +107,17 @@ class Load:
         self.cells(mesh)
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        """Add the integrals of `_density` times the shape functions over all cells to `forces` (n_points, dim)."""
+        """Add the nodal forces due to the `_force_density` on all cells to `forces` (n_points, dim)."""
         for element, cells in self.cells(mesh).items():
-            x, N, measure = measured_points(mesh, element, cells, kinematics)
-            add_density(forces, cells, N, self._density(x) * measure[:, :, None])
+            x, N, measure = quadrature_points(mesh, element, cells, kinematics)
+            add_forces(forces, cells, N, self._force_density(x) * measure[:, :, None])
 
-    def _density(self, x: Array) -> Array:
+    def _force_density(self, x: Array) -> Array:
         """Return the force per unit area or volume (c, q, dim) at positions `x` (c, q, dim) [length]."""
-        density = np.zeros(x.shape)
+        force_density = np.zeros(x.shape)
         for axis, value in self.components.items():
-            density[:, :, axis] = evaluated(value, x, self.name)
-        return density
+            force_density[:, :, axis] = evaluated(value, x, self.name)
+        return force_density
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,8 @@ class Pressure(Load):
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for element, facets in self.cells(mesh).items():
-            x, N, normal = facet_points(mesh, element, facets, kinematics)
-            add_density(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * normal)
+            x, N, vectors = facet_points(mesh, element, facets, kinematics)
+            add_forces(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * vectors)
 
 
 @dataclass(frozen=True)
@@ -241,8 +241,8 @@ class TotalForce(ComponentLoad):
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         nodal_areas, area = np.zeros((mesh.n_points, 1)), 0.0
         for element, facets in self.cells(mesh).items():
-            _, N, measure = measured_points(mesh, element, facets, kinematics)
-            add_density(nodal_areas, facets, N, measure[:, :, None])
+            _, N, measure = quadrature_points(mesh, element, facets, kinematics)
+            add_forces(nodal_areas, facets, N, measure[:, :, None])
             area += float(measure.sum())
         for axis, value in self.components.items():
             forces[:, axis] = nodal_areas[:, 0] * (value / area)
@@ -372,27 +372,27 @@ def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> 
     weight of a point and, in axisymmetry, the circumference.
     """
     x, N, dN, weights = _quadrature(mesh, element, facets)
-    normal = area_vectors(mesh.points[facets], dN) * weights[:, None]
-    return x, N, normal if kinematics != "axisymmetric" else normal * (2.0 * np.pi * x[:, :, :1])
+    vectors = area_vectors(mesh.points[facets], dN) * weights[:, None]
+    return x, N, vectors if kinematics != "axisymmetric" else vectors * (2.0 * np.pi * x[:, :, :1])
 
 
-def measured_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
+def quadrature_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (c, q, dim) [length], shape functions (q, n) [-] and volumes or areas (c, q) [length^dim].
 
     The values are those at the quadrature points of cells or facets, `cells` (c, n) of int. Volumes and areas include the
     weight of a point and, in axisymmetry, the circumference.
     """
     if elements.get(element).dim < mesh.dim:
-        x, N, normal = facet_points(mesh, element, cells, kinematics)
-        return x, N, np.linalg.norm(normal, axis=2)
+        x, N, vectors = facet_points(mesh, element, cells, kinematics)
+        return x, N, np.linalg.norm(vectors, axis=2)
     x, N, dN, weights = _quadrature(mesh, element, cells)
     return x, N, cell_volumes(mesh.points[cells], N, dN, kinematics == "axisymmetric") * weights
 
 
-def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:
-    """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
+def add_forces(forces: Array, cells: Numbers, N: Array, point_forces: Array) -> None:
+    """Distribute forces at quadrature points to the nodes with the shape functions, and add them to nodal `forces`, in place.
 
-    `density` (c, q, dim) [force] includes the volume or area of each quadrature point. `cells` (c, n) of int contains the
-    nodes of the cells, and `N` (q, n) [-] the shape functions.
+    `forces` (n_points, dim) [force] and `point_forces` (c, q, dim) [force] may also have another unit, the same for both.
+    `cells` (c, n) of int contains the nodes of the cells, and `N` (q, n) [-] the shape functions.
     """
-    np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))
+    np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, point_forces))

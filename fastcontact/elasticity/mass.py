@@ -10,7 +10,7 @@ from scipy.sparse import bsr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
-from fastcontact.elasticity.incompatible_modes import PAIRS
+from fastcontact.elasticity.incompatible_modes import VOIGT
 from fastcontact.elasticity.loads import DensityField, solid_rows
 from fastcontact.elasticity.recovery import CellStress
 from fastcontact.elasticity.stiffness import Sparsity, sparsity
@@ -76,7 +76,7 @@ def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, An
         stress = stresses.at(name, xi, cells, material[name][rows], rows)
         gradient, _ = gradients_at(coordinates, dN)
         weighted = cell_volumes(coordinates, N, dN, axisymmetric)[..., None] * weights[:, None] * stress
-        tensor = weighted[..., PAIRS[mesh.dim]]
+        tensor = weighted[..., VOIGT[mesh.dim]]
         integrals = np.einsum("cqai,cqij,cqbj->cab", gradient, tensor, gradient, optimize=True)
         by_component = np.repeat(integrals[..., None], mesh.dim, axis=3)
         if axisymmetric:

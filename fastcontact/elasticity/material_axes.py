@@ -15,7 +15,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
 # Indices (i, j) of the components xx, yy, zz, xy, yz, xz of stress and strain.
-PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+TENSOR_INDICES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
 @dataclass(frozen=True)
@@ -159,8 +159,8 @@ def rotations(frame: Array) -> Array:
     The components are xx, yy, zz, xy, yz, xz.
     """
     rotation = np.empty((len(frame), 6, 6))
-    for row, (i, j) in enumerate(PAIRS):
-        for column, (a, b) in enumerate(PAIRS):
+    for row, (i, j) in enumerate(TENSOR_INDICES):
+        for column, (a, b) in enumerate(TENSOR_INDICES):
             rotation[:, row, column] = frame[:, a, i] * frame[:, b, j]
             if a != b:
                 rotation[:, row, column] += frame[:, b, i] * frame[:, a, j]

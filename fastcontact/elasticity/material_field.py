@@ -152,7 +152,7 @@ class MaterialField:
         return sum(int(np.count_nonzero(no_expansion[self.rows[name]] & heated[name])) for name in heated)
 
     @cached_property
-    def distinct(self) -> dict[str, Numbers]:
+    def distinct_materials(self) -> dict[str, Numbers]:
         """Material numbers (n_cells,) by element type; equal materials share one number.
 
         Equal materials have the same moduli, axes and expansion, so that the stress is continuous across their interface.

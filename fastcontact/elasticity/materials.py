@@ -16,7 +16,7 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Value
-from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
+from fastcontact.elasticity.material_axes import TENSOR_INDICES, Axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, map_constants, varying_items, wrap_varying
 from fastcontact.errors import ModelError, check_known
 from fastcontact.round_off import ROUND_OFF
@@ -234,15 +234,15 @@ class Material:
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the strain (n, 4), in 3D (n, 6) [1 / temperature] per unit temperature rise at `points` (n, dim) [length].
 
-        It is NaN without a coefficient of thermal expansion. Raises ModelError if it has an out-of-plane shear component,
-        which plane kinematics exclude.
+        The strain is NaN without a coefficient of thermal expansion. Raises ModelError if it has an out-of-plane shear
+        component, which plane kinematics exclude.
         """
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
             return np.full((len(points), size), np.nan)
         expansion = (self if constants is None else constants).expansion
         components, tensor = self._along_axes(expansion, points, kinematics, constants)
-        strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
+        strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in TENSOR_INDICES], axis=1)
         if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(components).max(initial=0.0):
             raise ModelError(
                 f"the expansion of the material with {self.described} causes out-of-plane shear: align one axis with z, "

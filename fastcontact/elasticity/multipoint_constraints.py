@@ -41,7 +41,7 @@ class MultiPointConstraint:
 
 @record
 class TemporaryConstraint(MultiPointConstraint):
-    """A constraint that acts in the load steps between two instants, and at whose beginning ``rows @ u`` is continuous.
+    """A constraint that acts in the load steps between two instants; ``rows @ u`` is continuous at the first of them.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ class TemporaryConstraint(MultiPointConstraint):
     begins, ends : float
         The two instants, which must be ends of load steps [-].
     keeps : bool
-        Whether ``rows @ u`` retains the values that it has at the beginning, irrespective of `value` and `ramp`. Otherwise,
-        it changes linearly from these values to the next point of the ramp.
+        Whether ``rows @ u`` retains the values that it has at the instant `begins`, irrespective of `value` and `ramp`.
+        Otherwise, it changes linearly from these values to the next point of the ramp.
     """
 
     begins: float = -np.inf
@@ -67,7 +67,7 @@ class TemporaryConstraint(MultiPointConstraint):
         return self.begins <= begin < self.ends
 
     def begun_constraints(self, initial_values: Array) -> list[MultiPointConstraint]:
-        """Return the constraints that begin at the instant `begins`.
+        """Return the constraints that act from the instant `begins` on.
 
         `initial_values` (m,) [length times the unit of the coefficients] contains the values of ``rows @ u`` at this instant.
         """

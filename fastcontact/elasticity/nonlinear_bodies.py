@@ -83,7 +83,7 @@ class NonlinearBodies:
         size = field.moduli.shape[1]
         self._moduli, self._expansion = np.zeros((len(field.moduli), 6, 6)), np.zeros((len(field.moduli), 6))
         self._moduli[:, :size, :size], self._expansion[:, :size] = field.moduli, np.nan_to_num(field.expansion)
-        self._cells = {name: _rows_at_points(field.moduli_rows[name], name) for name in mesh.solids}
+        self._moduli_rows = {name: _rows_at_points(field.moduli_rows[name], name) for name in mesh.solids}
         self._averaged = field.averaged & (kinematics != "plane_stress")
         self._constants = self._constants_of_laws()
         self._splits = {name: self._split(name) for name in mesh.solids}
@@ -110,7 +110,7 @@ class NonlinearBodies:
     def halving_estimates_error(self) -> bool:
         """Whether `change_if_halved` estimates the error of the plastic flow.
 
-        It does not do so in plane stress, where the out-of-plane strain changes the strain path when yielding begins.
+        There is no such estimate in plane stress, where the out-of-plane strain changes the strain path when yielding begins.
         """
         return self.yields and self.kinematics != "plane_stress"
 
@@ -122,7 +122,7 @@ class NonlinearBodies:
     @property
     def initial_history(self) -> History:
         """The history before the first load step."""
-        return {name: np.zeros((*numbers.shape, N_HISTORY)) for name, numbers in self._cells.items()}
+        return {name: np.zeros((*rows.shape, N_HISTORY)) for name, rows in self._moduli_rows.items()}
 
     def _split(self, name: str) -> tuple[Array, Array, Array]:
         """Return the moduli for an element type, and bulk moduli (n_moduli, 2) and polynomials (n_q, m) for its dilatation.
@@ -166,8 +166,8 @@ class NonlinearBodies:
             `body_kernels.linearise`. With 0, the tangent is positive definite farther from the solution, and also if the
             rotation of a loaded body is prevented by contact alone.
         tangent : bool
-            Whether K is computed at once. Otherwise, it is computed when it is first used. This halves the time if K is not
-            used, and increases it by half if K is used.
+            Whether K is computed at once. Otherwise, it is computed when it is first used, which halves the time if K is not
+            used, and increases it by half if it is.
 
         Raises
         ------
@@ -195,7 +195,7 @@ class NonlinearBodies:
 
         mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
         history, stress, force, energy = {}, {}, np.zeros((mesh.n_points, dim)), np.zeros(2)
-        rise_or_none = np.zeros(0) if rise is None else rise
+        rise_or_empty = np.zeros(0) if rise is None else rise
         flags = self.kinematics == "axisymmetric", self.kinematics == "plane_stress", self.finite, geometric
         for name, cells in mesh.solids.items():
             N, dN, weights = elements.get(name).tables
@@ -203,15 +203,15 @@ class NonlinearBodies:
             owner, row_ranges = pattern.owners(mesh, name)
             cauchy = np.empty((*old_history[name].shape[:2], 6 if dim == 3 else 4))
             new = np.empty_like(old_history[name]) if self._has_history else old_history[name][:0]
-            energies, numbers = np.zeros((len(cells), 2)), self._cells[name]
+            energies, moduli_rows = np.zeros((len(cells), 2)), self._moduli_rows[name]
             slots, old = pattern.slots[name], old_history[name]
 
             def linearise_part(number: int) -> tuple[int, int]:
                 rows = slice(*row_ranges[number])  # noqa: B023
                 status, cell = body_kernels.linearise(
                     mesh.points, cells[rows], N, dN, weights, polynomials, *flags, displacement, self._constants, moduli,  # noqa: B023
-                    bulk, self._expansion, rise_or_none, numbers[rows], old[rows], slots[rows], owner, number, elastic, data,  # noqa: B023
-                    force, new[rows], cauchy[rows], energies[rows],  # noqa: B023
+                    bulk, self._expansion, rise_or_empty, moduli_rows[rows], old[rows], slots[rows], owner,  # noqa: B023
+                    number, elastic, data, force, new[rows], cauchy[rows], energies[rows],  # noqa: B023
                 )  # fmt: skip
                 return status, int(cell) + rows.start
 
@@ -258,9 +258,9 @@ class NonlinearBodies:
             halved_bodies = self.at(end, self.at(middle, old_history, tangent=False).history, tangent=False)
         except ConvergenceError:
             return 0.0, 0.0
-        twice_shear = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # in the norm of a tensor
+        weights = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # of components in the norm of a tensor
         stresses = (bodies.stress, halved_bodies.stress)
-        parts = [[(s[name][points] * twice_shear).ravel() for name, points in flowing.items()] for s in stresses]
+        parts = [[(s[name][points] * weights).ravel() for name, points in flowing.items()] for s in stresses]
         stress, halved_stress = map(np.concatenate, parts)
         return float(np.linalg.norm(stress)), float(np.linalg.norm(halved_stress - stress))
 
@@ -288,13 +288,13 @@ class NonlinearBodies:
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
         """Return the fields of `field_names` (n_solids,): the volume ratio of each cell, and extremes over its points."""
-        fields = {name: self._fields(name, bodies, displacement) for name in self._cells}
+        fields = {name: self._fields(name, bodies, displacement) for name in self._moduli_rows}
         names = field_names(self._materials, "finite" if self.finite else "small")
         return {name: np.concatenate([field[i] for field in fields.values()]) for i, name in enumerate(names)}
 
     def _fields(self, name: str, bodies: DeformedBodies, displacement: Array) -> list[Array]:
         """Return the values (n_cells,) of `field_names` for the cells of an element."""
-        J, fields = np.ones(self._cells[name].shape), list[Array]()
+        J, fields = np.ones(self._moduli_rows[name].shape), list[Array]()
         if self.finite:
             J, *fields = self._strains(name, bodies, displacement)
         if self.yields:
@@ -321,7 +321,7 @@ class NonlinearBodies:
 
         The yield condition refers to the Kirchhoff stress, which is J (n_cells, n_q) times the Cauchy stress.
         """
-        history, owner = bodies.history[name], self._owner[self._cells[name]]
+        history, owner = bodies.history[name], self._owner[self._moduli_rows[name]]
         strain = history[..., PLASTIC_STRAIN]
         ratio = np.zeros(strain.shape)
         for index, law in enumerate(self._materials):
@@ -352,8 +352,8 @@ def check_law(law: Material, strain: str) -> None:
         raise ModelError(f"a nearly incompressible material ({law.described}) locks at finite strains: use {example}")
 
 
-def _rows_at_points(numbers: Numbers, name: str) -> Numbers:
+def _rows_at_points(rows: Numbers, name: str) -> Numbers:
     """Return the row of moduli of each quadrature point (n_cells, n_q), given the rows of cells or of quadrature points."""
     n_q = len(elements.get(name).quadrature[1])
-    columns = numbers[:, None] if numbers.ndim == 1 else numbers
+    columns = rows[:, None] if rows.ndim == 1 else rows
     return np.array(np.broadcast_to(columns, (len(columns), n_q)), order="C")  # writable, also if n_q is 1

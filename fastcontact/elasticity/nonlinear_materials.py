@@ -107,9 +107,9 @@ class ElasticPlastic(NonlinearElastic):
         check_positive("the yield stress", self.yield_stress)
         if not 0.0 <= self.kinematic < math.inf:
             raise ModelError(f"the modulus of kinematic hardening = {self.kinematic} must be zero or more")
-        object.__setattr__(self, "hardening", self._table())
+        object.__setattr__(self, "hardening", self._hardening_table())
 
-    def _table(self) -> tuple[tuple[float, float], ...]:
+    def _hardening_table(self) -> tuple[tuple[float, float], ...]:
         """Return the hardening table, which begins at zero plastic strain; raise ModelError if it is not valid."""
         rows = number_pairs(() if self.hardening is None else self.hardening)
         if rows is None:
@@ -192,7 +192,7 @@ class NeoHookean(Hyperelastic):
 
 @dataclass(frozen=True)
 class FromConstants(Hyperelastic):
-    """Base class of laws whose constants determine E and nu.
+    """Base class of hyperelastic laws with constants of their own, from which E and nu at small strains follow.
 
     Parameters
     ----------
@@ -234,6 +234,7 @@ class Polynomial(FromConstants):
 
     @property
     def _coefficients(self) -> list[float]:
+        """C10, C01, C20 and C30, zero for those that the law does not have [pressure]."""
         return [float(getattr(self, name, 0.0)) for name in ("C10", "C01", "C20", "C30")]
 
     @property
@@ -247,7 +248,7 @@ class Polynomial(FromConstants):
 class MooneyRivlin(Polynomial):
     """Mooney-Rivlin hyperelasticity (Mooney, 1940; Rivlin, 1948): C10 (I1 - 3) + C01 (I2 - 3) + K (J - 1)^2 / 2.
 
-    I1 and I2 are the invariants of the isochoric stretches, and J is the volume ratio.
+    I1 and I2 are the invariants of the isochoric right Cauchy-Green tensor, and J is the volume ratio.
 
     Parameters
     ----------
@@ -279,7 +280,7 @@ class MooneyRivlin(Polynomial):
 class Yeoh(Polynomial):
     """Yeoh hyperelasticity (Yeoh, 1993): C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + K (J - 1)^2 / 2.
 
-    I1 is the first invariant of the isochoric stretches, and J is the volume ratio.
+    I1 is the first invariant of the isochoric right Cauchy-Green tensor, and J is the volume ratio.
 
     Parameters
     ----------
@@ -310,16 +311,16 @@ class Yeoh(Polynomial):
 @typed(ModelError)
 @dataclass(frozen=True)
 class Ogden(FromConstants):
-    """Ogden hyperelasticity (Ogden, 1972): the sum of ``2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3)``.
+    """Ogden hyperelasticity (Ogden, 1972), with energy terms ``2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3)``.
 
-    l1, l2 and l3 are the isochoric stretches. The volumetric energy is ``K (J - 1)^2 / 2`` with the volume ratio J.
+    l1, l2 and l3 are the isochoric principal stretches. The volumetric energy is ``K (J - 1)^2 / 2`` with the volume ratio J.
 
     Parameters
     ----------
     mu : float or sequence of float
-        Modulus of each term [pressure]; the sum is the shear modulus at small strains.
+        Modulus of each term [pressure]; their sum is the shear modulus at small strains.
     alpha : float or sequence of float
-        Exponents, which must not be zero [-].
+        Exponent of each term, not zero [-].
     bulk : float
         Bulk modulus K of ``K (J - 1)^2 / 2`` [pressure].
     volumetric, density, expansion, conductivity

@@ -11,7 +11,7 @@ from fastcontact._tools.argument_types import typed, unchecked
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.elasticity import dilatation, incompatible_modes
 from fastcontact.elasticity.energy import gradients_at
-from fastcontact.elasticity.incompatible_modes import PAIRS
+from fastcontact.elasticity.incompatible_modes import VOIGT
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
 from fastcontact.elasticity.stiffness import LOOPS, cell_materials
@@ -332,7 +332,7 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
             if axisymmetric:
                 radius = np.einsum("qa,ca->cq", N, coordinates[..., 0])
                 weighted *= 2.0 * np.pi * radius[..., None]
-            nodal = np.einsum("cqaj,cqij->cai", gradient, weighted[..., PAIRS[mesh.dim]], optimize=True)
+            nodal = np.einsum("cqaj,cqij->cai", gradient, weighted[..., VOIGT[mesh.dim]], optimize=True)
             if axisymmetric:
                 nodal[..., 0] += weighted[..., 2] / radius @ N
             for i in range(mesh.dim):
@@ -360,7 +360,7 @@ def principal_stress(stress: Array) -> Array:
     """
     stress = _checked_components(stress)
     six_components = np.concatenate([stress, np.zeros((*stress.shape[:-1], 6 - stress.shape[-1]))], axis=-1)
-    return np.asarray(np.linalg.eigvalsh(six_components[..., PAIRS[3]]))
+    return np.asarray(np.linalg.eigvalsh(six_components[..., VOIGT[3]]))
 
 
 @typed(ModelError)

@@ -1,11 +1,11 @@
 """Recovered nodal stresses for error estimation.
 
 Stresses are most accurate at the centres of linear cells and at the reduced Gauss points of quadratic cells (Barlow, 1976).
-In wedges and pyramids, the latter lie at 1/sqrt(3) of the distance from the centre to the corners. Stresses are extrapolated
+In wedges and pyramids, points at 1/sqrt(3) of the distance from the centre to the corners are used. Stresses are extrapolated
 from these points to the nodes, and averaged at each node over the cells of one material. Polynomials fitted to patches of
 cells (Zienkiewicz and Zhu, 1992) are less accurate near the edge of a contact, where the pressure decreases like a square
-root. They smooth this decrease over two cells, so that the estimated error of quadratic cells is too large by a factor of two
-to four.
+root: the polynomials smooth this decrease over two cells, so that the estimated error of quadratic cells is too large by a
+factor of two to four.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def smoothed_stress(mesh: Mesh, field: MaterialField, stress: CellStress | Point
     """
     components = field.moduli.shape[1]
     at_nodes = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
-    material = field.distinct
+    material = field.distinct_materials
     for number in np.unique(np.concatenate([*material.values()])):
         average = NodalAverage(mesh.n_points, components)
         rows_of_material = {name: np.flatnonzero(material[name] == number) for name in at_nodes}

@@ -174,7 +174,7 @@ def stiffness_warnings(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
 
 
 def _stiffness_ratio(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:
-    """Return the largest ratio of the stiffness of a spring to that of the softer body at its ends, and the latter."""
+    """Return the largest ratio of a spring stiffness to the stiffness of a body at an end of the spring, and the latter."""
     rows = spring.rows.tocoo()
     row, node = rows.coords[0], rows.coords[1] // dim
     ends, index = np.unique(np.stack([row, node]), axis=1, return_inverse=True)

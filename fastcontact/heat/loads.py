@@ -20,10 +20,10 @@ from fastcontact.elasticity.loads import (
     Table,
     Value,
     VolumeLoad,
-    add_density,
+    add_forces,
     check_points,
     evaluated,
-    measured_points,
+    quadrature_points,
 )
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import Blocks, assembled
@@ -83,7 +83,7 @@ class FixedTemperature(TemporaryHeat):
             )
 
     def history(self) -> tuple[Table | None, Table]:
-        """Return the ramps of the rises of `value` and `reached`; the latter is zero from the next point of `ramp` on."""
+        """Return the ramps of the rises of `value` and `reached`; that of `reached` falls to zero at the next ramp point."""
         later = [point for point in self.ramp or () if point[0] > self.begins]
         if self.reached is None or not later:
             return self.ramp, ()
@@ -100,9 +100,9 @@ class Heating(Load):
         """Return the heat flows (n_points,) [power] into the nodes of the `deformed` mesh at multiplier 1."""
         total = np.zeros((mesh.n_points, 1))
         for element, cells in self.cells(mesh).items():
-            x, N, _ = measured_points(mesh, element, cells, kinematics)
-            measure = measured_points(deformed, element, cells, kinematics)[2]
-            add_density(total, cells, N, (evaluated(self.value, x, self.name) * measure)[:, :, None])
+            x, N, _ = quadrature_points(mesh, element, cells, kinematics)
+            measure = quadrature_points(deformed, element, cells, kinematics)[2]
+            add_forces(total, cells, N, (evaluated(self.value, x, self.name) * measure)[:, :, None])
         return total[:, 0]
 
 
@@ -184,12 +184,12 @@ class Film(TemporaryHeat):
         """
         blocks, powers = list[Blocks](), np.zeros((mesh.n_points, 1))
         for element, facets in self.cells(mesh).items():
-            x, N, _ = measured_points(mesh, element, facets, kinematics)
+            x, N, _ = quadrature_points(mesh, element, facets, kinematics)
             h = evaluated(self.coefficient, x, f"the coefficient of {self.name}")
             if h.min(initial=0.0) < 0.0:
                 raise ModelError(f"the coefficient of {self.name} is {h.min():g}: it must not be negative")
-            h *= measured_points(deformed, element, facets, kinematics)[2]
+            h *= quadrature_points(deformed, element, facets, kinematics)[2]
             rise = evaluated(self.ambient, x, f"the ambient temperature of {self.name}") - reference
-            add_density(powers, facets, N, (h * rise)[:, :, None])
+            add_forces(powers, facets, N, (h * rise)[:, :, None])
             blocks.append((facets, facets, np.einsum("fq,qa,qb->fab", h, N, N)))
         return assembled(blocks, (mesh.n_points, mesh.n_points)), powers[:, 0]

@@ -37,7 +37,7 @@ def weighted_area_vectors(
 ) -> tuple[Array, Array]:
     """Return integrals of area vectors times test functions, and their derivatives with respect to the nodal positions.
 
-    The derivatives are those of a following pressure (Bonet and Wood, 2008, section 8.5).
+    The derivatives are those of a follower pressure (Bonet and Wood, 2008, section 8.5).
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def weighted_area_vectors(
     derivative : ndarray (n, k, dim, k, dim)
         Derivatives, with the node and the component of the position as the last two indices [length].
     """
-    normal = area_vectors(x, dN)
-    derivative = np.zeros((*normal.shape[:2], dN.shape[1], x.shape[2], x.shape[2]))
+    area_vector = area_vectors(x, dN)
+    derivative = np.zeros((*area_vector.shape[:2], dN.shape[1], x.shape[2], x.shape[2]))
     if x.shape[2] == 2:
         derivative[..., 0, 1], derivative[..., 1, 0] = dN[:, :, 0], -dN[:, :, 0]
     else:
@@ -71,9 +71,9 @@ def weighted_area_vectors(
     if axisymmetric:
         circle = 2.0 * np.pi * x[:, :, 0] @ N.T
         derivative *= circle[..., None, None, None]
-        derivative[..., 0] += 2.0 * np.pi * np.einsum("qb,fqi->fqbi", N, normal)
-        normal = normal * circle[..., None]
-    vectors = np.einsum("fq,qa,fqi->fai", weights, test, normal)
+        derivative[..., 0] += 2.0 * np.pi * np.einsum("qb,fqi->fqbi", N, area_vector)
+        area_vector = area_vector * circle[..., None]
+    vectors = np.einsum("fq,qa,fqi->fai", weights, test, area_vector)
     return vectors, np.einsum("fq,qa,fqbij->faibj", weights, test, derivative)
 
 

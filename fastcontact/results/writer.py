@@ -380,7 +380,7 @@ def _materials_at_interfaces(model: Any) -> Any:
     """Return the numbers of the materials of all solid cells (n_solids,); None for a model without material interfaces."""
     if not getattr(model, "materials", None) or not hasattr(model, "material_numbers"):
         return None
-    material = model.material_field().distinct
+    material = model.material_field().distinct_materials
     if not len(material_sides(model.mesh, material).points):
         return None
     return np.concatenate(list(material.values()))

@@ -24,8 +24,8 @@ from fastcontact._tools.html_table import fields_table
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import by_block, surface
-from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
-from fastcontact.elasticity.incompatible_modes import PAIRS
+from fastcontact.elasticity.energy import cell_volumes, integration_rule, twice_energy_density
+from fastcontact.elasticity.incompatible_modes import VOIGT
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.loads import check_solids, solid_rows
 from fastcontact.elasticity.recovery import CellStress, interpolation
@@ -206,8 +206,8 @@ def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, cell
     exact_u, exact_stress = _exact_fields(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
-        elastic_energy(stress - exact_stress, compliance), (error_u**2).sum(axis=-1),
-        elastic_energy(exact_stress, compliance), (exact_u**2).sum(axis=-1),
+        twice_energy_density(stress - exact_stress, compliance), (error_u**2).sum(axis=-1),
+        twice_energy_density(exact_stress, compliance), (exact_u**2).sum(axis=-1),
     )  # fmt: skip
     return np.array([(density * volume).sum() for density in densities])
 
@@ -307,8 +307,8 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
         order, u = elements.get(name).order, step.displacement
         N, stress, volume, compliance = _cell_arrays(model, name, slice(None), u, order + 1, offset)
         difference = np.einsum("qa,cai->cqi", N, smooth[name]) - stress
-        squares.append((elastic_energy(difference, compliance) * volume).sum(axis=1))
-        energy += float((elastic_energy(stress, compliance) * volume).sum())
+        squares.append((twice_energy_density(difference, compliance) * volume).sum(axis=1))
+        energy += float((twice_energy_density(stress, compliance) * volume).sum())
     contact = np.zeros(sum(map(len, squares)))
     for result in step.contact.values():
         _add_contact(model, result, smooth, contact)
@@ -340,7 +340,7 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
                 continue
             local = np.argmax(mesh.cells[name][cell][:, None] == block.facets[facet][:, :, None], axis=2)
             nodal_stress = smooth[name][cell[:, None], local]
-            tensor = np.einsum("qa,fai->fqi", N, nodal_stress)[..., PAIRS[mesh.dim]]
+            tensor = np.einsum("qa,fai->fqi", N, nodal_stress)[..., VOIGT[mesh.dim]]
             traction = (tensor * normals[facet][..., None, :]).sum(axis=-1)
             p = nodal_pressure[block.facets[facet]] @ N.T
             jump = ((traction + p[:, :, None] * normals[facet]) * normals[facet]).sum(axis=2)

@@ -11,7 +11,7 @@ from refusals import refused
 from scipy.optimize import brentq
 
 import fastcontact as fc
-from fastcontact.elasticity.loads import measured_points
+from fastcontact.elasticity.loads import quadrature_points
 
 pytestmark = pytest.mark.each_value
 
@@ -184,7 +184,7 @@ def error_of_manufactured(kinematics, element, count):
     model.add_heat_source(lambda p: 7.0 * source(p))
     step, square, whole = fc.solve(model, 1)[-1], 0.0, 0.0
     for name, cells in mesh.solids.items():
-        x, N, volume = measured_points(mesh, name, cells, kinematics)
+        x, N, volume = quadrature_points(mesh, name, cells, kinematics)
         wanted = exact(x.reshape(-1, mesh.dim)).reshape(volume.shape)
         square += float((volume * (step.temperature[cells] @ N.T - wanted) ** 2).sum())
         whole += float((volume * wanted**2).sum())

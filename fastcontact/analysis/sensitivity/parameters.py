@@ -14,7 +14,7 @@ from fastcontact.analysis.sensitivity.moving_contact import INCREMENT, MovingCon
 from fastcontact.analysis.sensitivity.quantities import Label
 from fastcontact.analysis.wear import Worn
 from fastcontact.arrays import Array
-from fastcontact.elasticity.anisotropic_materials import NAMES, Anisotropic, Orthotropic
+from fastcontact.elasticity.anisotropic_materials import AXIS_PAIRS, Anisotropic, Orthotropic
 from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.materials import LinearElastic, Material
@@ -28,7 +28,7 @@ from fastcontact.model.pretension import Pretension, PretensionForce
 from fastcontact.model.ramp import combined, multiplier
 
 # Names of the components of the constants of orthotropic materials, by constant.
-CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
+CONSTANTS = {"E": "123", "nu": AXIS_PAIRS, "G": AXIS_PAIRS, "expansion": "123"}
 
 
 def _constant_derivatives(contact: MovingContact, parameter: Label) -> Change:
@@ -98,7 +98,7 @@ def _admissible_range(material: Material, name: str, component: int | None) -> f
         return min(0.5 - value, 1.0 + value)
     assert isinstance(material, Orthotropic)
     assert component is not None
-    i, j = (int(axis) - 1 for axis in NAMES[component])
+    i, j = (int(axis) - 1 for axis in AXIS_PAIRS[component])
     S = material.local_compliance[:3, :3]
     size = np.sqrt(np.diag(S))
     return float(np.linalg.eigvalsh(S / np.outer(size, size))[0] * size[j] / size[i])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from fastcontact.elasticity.incompatible_modes import BENDING
+from fastcontact.elasticity.incompatible_modes import ELEMENTS_WITH_MODES
 
 # Indices of the facets of a mesh element that are its faces 1, 2, ... in Abaqus and CalculiX, by the first three letters of
 # its name.
@@ -80,7 +80,7 @@ def element_type(name: str) -> ElementType | None:
     element = table.get(base[3:])
     if incompatible and kinematics == "axisymmetric":
         incompatible, note = False, "without incompatible modes, which makes thin parts stiffer in bending"
-    elif incompatible and element not in BENDING:  # C3D10I has improved surface stresses instead of incompatible modes
+    elif incompatible and element not in ELEMENTS_WITH_MODES:  # C3D10I has improved surface stresses instead of modes
         incompatible, note = False, "replaced by the standard quadratic element"
     return ElementType(name, element, kinematics, note, incompatible, heat_only) if element and kinematics else None
 

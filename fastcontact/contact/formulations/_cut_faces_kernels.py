@@ -22,9 +22,9 @@ def planes(corners, n_corners, origin, axes):
         _plane(corners[i], n_corners, origin[i], axes[i])
 
 
-# This function is inlined. Of a separate kernel, the process that compiles it and later processes, which load it from the
-# cache, would run different copies, in which products and sums may be fused differently. Tangents that differ in the last
-# bit would change all contact results.
+# This function is inlined. If it were a separate kernel, the process that compiles it and later processes that load it from
+# the cache would run different copies, in which products and sums may be fused differently. Tangents that differ in the
+# last bit would change all contact results.
 @innermost_kernel
 def _plane(corners, count, origin, axes):
     origin[:] = 0.0
@@ -67,7 +67,7 @@ def _flatten(points, count, n_positions, origin, axes, flat):
 
 @kernel
 def _area(flat, count):
-    """Return the signed area of a polygon, positive if its corners are in counter-clockwise order."""
+    """Return the signed area of the polygon `flat` (count, 2), positive if its corners are in counter-clockwise order."""
     area = 0.0
     for k in range(count):
         m = (k + 1) % count
@@ -77,7 +77,7 @@ def _area(flat, count):
 
 @kernel
 def _centroid(flat, count):
-    """Return the centre of area of a polygon."""
+    """Return the centre of area of the polygon `flat` (count, 2)."""
     x, y, twice_area = 0.0, 0.0, 0.0
     for k in range(1, count - 1):
         ux, uy = flat[k, 0] - flat[0, 0], flat[k, 1] - flat[0, 1]
@@ -94,7 +94,7 @@ def _clip(subject, count, window, n_window, spare, tolerance):
     """Clip `subject` in place by a convex, counter-clockwise `window` (Sutherland and Hodgman); return its number of corners.
 
     A corner is taken to lie on a side of the window if the parallelogram that they span has at most the area `tolerance`.
-    Otherwise, nearly coincident sides would intersect at points that depend on round-off.
+    Otherwise, nearly coincident sides would intersect at points that depend on round-off. `spare` is overwritten.
     """
     for w in range(n_window):
         ax, ay = window[w, 0], window[w, 1]
@@ -124,7 +124,10 @@ def _clip(subject, count, window, n_window, spare, tolerance):
 
 @kernel
 def _overlap(corners, count, other_corners, n_other, origin, axes, subject, window, spare):
-    """Fill `subject` with the overlap of two polygons; return its number of corners, 0 for none."""
+    """Fill `subject` with the overlap of two polygons in the plane at `origin` with `axes`; return its number of corners.
+
+    The number is 0 if they do not overlap. `window` and `spare` are overwritten.
+    """
     _flatten(corners, count, count, origin, axes, subject)
     tolerance = ROUND_OFF * _area(subject, count)
     _flatten(other_corners, n_other, n_other, origin, axes, spare)
@@ -138,7 +141,7 @@ def _overlap(corners, count, other_corners, n_other, origin, axes, subject, wind
 
 @kernel
 def _may_intersect(low, high, origin, normal, radius, reach):
-    """Return whether a box may intersect a cylinder with the given `radius` and the length 2 `reach`.
+    """Return whether the box from `low` to `high` may intersect a cylinder with the given `radius` and the length 2 `reach`.
 
     The axis of the cylinder is the `normal` through its centre `origin`. The result is False for an empty box.
     """
@@ -179,7 +182,7 @@ def facing_pairs(
     max_cosine : float
         Largest cosine of the angle between the normals of facets that face each other, e.g. -0.1.
     pairs : (capacity, 2)
-        Filled with the numbers of the secondary and the primary facet, ascending in the former.
+        Filled with the numbers of the secondary and the primary facet, in ascending order of the secondary facets.
 
     Returns
     -------
@@ -234,7 +237,8 @@ def _fill_terms(n_terms, s, t, terms):
 def _locate(flat, x, y, xi, terms):
     """Move `xi` (2,) to the point of a facet above (x, y), and fill `terms` at this point.
 
-    Returns the area of the projected facet per unit of xi, or zero if there is no point above (x, y).
+    `flat` (n_terms, 2) are the coefficients of the projected facet. Returns its area per unit of xi, or zero if there is no
+    point above (x, y).
     """
     n_terms = flat.shape[0]
     for _ in range(MAX_ITERATIONS):
@@ -289,7 +293,7 @@ def _fill_shape(to_terms, terms, shape):
 
 @inlined_kernel
 def _add_products(area, shape, other_shape, mass, coupling, i):
-    """Add products of shape functions at a point to the lower triangle of ``mass[i]`` and to ``coupling[i]``."""
+    """Add products of shape functions, times an `area`, to the lower triangle of ``mass[i]`` and to ``coupling[i]``."""
     for a in range(shape.shape[0]):
         for b in range(a + 1):
             mass[i, a, b] += area * shape[a] * shape[b]

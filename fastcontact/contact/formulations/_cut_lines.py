@@ -37,7 +37,7 @@ def line_points(
     block: FacetBlock, primary: DeformedSide, reference: Array, axisymmetric: bool, n_gauss: int, tolerance: float,
     borders: tuple[Indices, Array] = NO_BORDERS,
 ) -> LinePoints:  # fmt: skip
-    """Cut the facets of a block in the configuration of `primary`, and place Gauss points in every segment.
+    """Cut the facets of a block in the configuration of `primary`, and place `n_gauss` Gauss points in every segment.
 
     The primary side is extended by `tolerance` facet lengths at its ends. `borders` are additional cuts, given by their
     facets (n,) and reference coordinates (n,).
@@ -75,8 +75,8 @@ def _opposite_nodes(block: FacetBlock, primary: DeformedSide) -> tuple[Indices, 
 
     Where two primary facets meet, the opposite point lies on the bisector of the angle between them, at which the closest
     facet changes. The closest point of the block is used only where the primary side ends, and at corners of the primary
-    side, near which points do not face the flank. It is unsuitable elsewhere: at a concave corner with a gap or an
-    interference, the closest point jumps from one facet to the next as the bodies move.
+    side, near which points do not face the flank. Elsewhere the closest point is unsuitable: at a concave corner with a gap
+    or an interference, it jumps from one facet to the next as the bodies move.
     """
     side, deformed, normals = primary.surface, primary.coordinates, primary.nodal_normals
     ends, first = np.unique(side.ends, return_index=True)
@@ -104,7 +104,10 @@ def _signed_distances(points: Array, origin: Array, normal: Array) -> Array:
 
 
 def opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> tuple[Indices, Array]:
-    """Return the points of a block on the normals at the ends of the primary side, as facets and reference coordinates."""
+    """Return the points of a block on the normals at the ends of the primary side, as facets and reference coordinates.
+
+    The points at which the primary side ends if it is extended by `tolerance` facet lengths are included.
+    """
     side, deformed = primary.surface, primary.coordinates
     # A tolerance of the order of round-off does not extend the side, because the cut would leave a sliver of this width.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
@@ -127,9 +130,9 @@ def opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) ->
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:
-    """Return the zeros of fields inside lines of two or three nodes.
+    """Return the zeros of n fields inside lines of two or three nodes, as numbers of fields and reference coordinates.
 
-    They are given by rows of the nodal `values` (n, k), and reference coordinates.
+    `values` (n, k) are the values of the fields at the nodes.
     """
     a, b = values[:, 0], values[:, 1]
     slope, middle = 0.5 * (b - a), 0.5 * (a + b) if values.shape[1] == 2 else values[:, 2]
@@ -140,8 +143,8 @@ def _zeros(values: Array) -> tuple[Indices, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         roots = np.stack([q / half_curvature, middle / q], axis=1)
     roots[slope**2 < 4.0 * half_curvature * middle] = np.nan
-    row, number = np.nonzero(np.abs(roots) < 1.0 - LENGTH_ROUND_OFF)
-    return row, roots[row, number]
+    field, number = np.nonzero(np.abs(roots) < 1.0 - LENGTH_ROUND_OFF)
+    return field, roots[field, number]
 
 
 def line_overlap(

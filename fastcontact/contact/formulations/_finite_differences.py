@@ -19,7 +19,7 @@ class FiniteDifferences:
     """Contact forces, gaps and slips of one pair, linearised by one-sided finite differences.
 
     The differences are taken at the mean of the displacements of the pairing and of its solution. The error of a Newton step
-    is then a tenth of that with differences at either of them.
+    is then a tenth of that with differences at one of the two displacements.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class FiniteDifferences:
         """Return nodal forces (n_dofs,) [force], and gaps and slips (1 + k, m) [length].
 
         They are those after a `motion` (n_points, dim) from the mean of the displacements [length]. The tangents of
-        `constraints` are rotated from its normals to the new ones by the smallest rotation.
+        `constraints` are rotated by the smallest rotation that maps the normals of `constraints` to the new normals.
         """
         (multiplier, tangential), (displacement, increment, change) = self.forces, self.motions
         varied = self.constraints_after(0.5 * change + motion)

@@ -82,8 +82,8 @@ class Formulation(ContactSides, ABC):
     allows_obstacles: ClassVar[bool] = True
     # Whether each node has one gap, which is weighted over the adjacent facets.
     weighs_gaps: ClassVar[bool] = False
-    # Whether gaps between bodies are linearised at the mean of the displacements at which the sides were paired and of the
-    # solution, which reduces the error of a Newton step. Otherwise, they are linearised at the former.
+    # Whether gaps between bodies are linearised at the mean of the displacements of the pairing and of the solution, which
+    # reduces the error of a Newton step, instead of at the displacements of the pairing.
     linearised_at_mean: ClassVar[bool] = False
 
     @property
@@ -208,7 +208,10 @@ class Formulation(ContactSides, ABC):
         return tied_constraints(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
-        """Return the `tied.reduction` of the multipliers of a tied pair; None if supports hold both sides at no node."""
+        """Return the `tied.reduction` of the multipliers of a tied pair; None if supports hold both sides at no node.
+
+        `moments` and `areas` are the results of `tied.moments_of`.
+        """
         # Directions in which all nodes of a facet are held are ignored.
         held = held_on_both_sides(self, Configuration.undeformed(self.points))
         held = without_complete_facets(held, self.secondary)

@@ -215,7 +215,7 @@ class PressureFieldFormulation(Formulation):
 
     augmentation: float = 1.0
 
-    # The error of a Newton step is a tenth of that without it.
+    # This reduces the error of a Newton step to a tenth.
     linearised_at_mean: ClassVar[bool] = True
 
     @property

@@ -1,7 +1,7 @@
 r"""Mortar contact with one weighted gap per node: :math:`\int \psi_j\, (x_s - x_p) \cdot n_j \ge 0`.
 
 The integrals extend over the mortar segments of the two sides (Puso, 2004; Popp, Gitterle, Gee and Wall, 2010). A gap is
-divided by the weight of its :math:`\psi_j`, so that it is a length and its multiplier is the nodal force. The normal is the
+divided by the integral of :math:`\psi_j`, so that it is a length and its multiplier is the nodal force. The normal is the
 mean of the normals of the primary side around the node.
 
 ``"dual"`` functions are biorthogonal to the shape functions of the secondary side, see `_dual_basis`. Each gap then involves
@@ -238,7 +238,7 @@ class WeightedMortar(Formulation):
     def _means(self, config: Configuration, earlier: Coverage | None = None) -> Means:
         """Return the weighted means in a configuration.
 
-        If an `earlier` coverage is given, its nodes have gaps. By default, these nodes result from the overlap.
+        The nodes with gaps are those of an `earlier` coverage if it is given; otherwise the overlap determines them.
         """
         overlap = self._overlap(config)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
@@ -297,8 +297,8 @@ class WeightedMortar(Formulation):
     def _needs_differences(self, config: Configuration, multiplier: Array) -> bool:
         """Return whether mean gaps are linearised by finite differences.
 
-        This is the case between two bodies in 3D, and in 2D if the primary side, or that of one of its bodies, ends within
-        facets that carry forces.
+        This is the case between two bodies in 3D, and in 2D if an end of the primary side, or of one of its pieces, lies
+        opposite the inside of facets that carry forces.
         """
         if isinstance(self.primary, RigidSide) or self.points.shape[1] == 3:
             return isinstance(self.primary, Surface)
@@ -356,7 +356,7 @@ class WeightedMortar(Formulation):
     def _constant_attributes(self) -> tuple[Array, Array, list[Any], Mask]:
         """The attributes of `WeightedPressures` that are the same in all pairings.
 
-        The first ones are `full_areas` if all nodal values of the multiplier field are independent.
+        The first of them is `full_areas` for a multiplier field whose nodal values are all independent.
         """
         areas, quadratic = nodal_areas(self.secondary, self.points, self.axisymmetric), []
         full_areas, held = np.zeros_like(areas), np.zeros(len(areas), bool)
@@ -416,9 +416,9 @@ class WeightedMortar(Formulation):
         return tuple(rows), substitutions
 
     def _weighted_integrals(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
-        """Return the mortar matrices D and M (m, n_points) [area], and the integrals of the gap reductions.
+        """Return the mortar matrices D and M (m, n_points) [area], and the weighted gap reductions (m, dim) [volume].
 
-        The latter are the integrals (m, dim) of psi times the vectors of `Overlap.gap_reductions` [volume].
+        The weighted gap reductions are the integrals of psi times the vectors of `Overlap.gap_reductions`.
         """
         overlap = coverage.overlap
         size = (len(self.secondary.points), len(self.points))

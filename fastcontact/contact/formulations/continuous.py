@@ -118,7 +118,8 @@ class Continuous(PressureFieldFormulation):
     def _facets_at_corners(self) -> Mask:
         """Return the lines (n_facets,) that end at a corner opposite a rigid obstacle, see the option `integration`.
 
-        If only the corner touches, it would penetrate by the distance of the closest Gauss point times the slope.
+        If only the corner touches, it would penetrate by its distance from the closest Gauss point times the slope of the
+        facet relative to the obstacle.
         """
         if self.integration is not None or self.points.shape[1] == 3 or isinstance(self.primary, Surface):
             return np.zeros(self.secondary.n_facets, bool)
@@ -167,7 +168,7 @@ class Continuous(PressureFieldFormulation):
         return areas.ravel()
 
     def _independent_values(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
-        """Return the map (n_nodes, k) from independent to nodal values of the field, and the nodes (k,) of the former.
+        """Return the map (n_nodes, k) from the independent values of the field to all nodal values, and their nodes (k,).
 
         All nodal values are independent, except at nodes without area, at excluded nodes, and with friction at ends of
         quadratic lines on the axis, see `integration.even_at_axis`. Without friction, the value on the axis is independent,
@@ -199,8 +200,8 @@ class Continuous(PressureFieldFormulation):
 
         The shape functions of the primary side have kinks within the secondary facets. The forces of the nodal `pressure`
         (n_nodes,) on primary nodes therefore differ from those of a finer rule. The difference is converted to a pressure
-        with the mass matrix of the primary side, and projected onto the pressure field. On a uniform pressure, it does not
-        depend on the size of the facets.
+        with the mass matrix of the primary side, and projected onto the pressure field. For a uniform pressure, this error
+        does not depend on the size of the facets.
         """
         primary, used = self.primary, self._field
         assert isinstance(primary, Surface)

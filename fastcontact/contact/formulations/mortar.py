@@ -79,7 +79,7 @@ class CompleteFacets:
     def degrees(self, mass: Array) -> Indices:
         """Return the degree (n_facets,) of the field that the covered part of each facet determines.
 
-        It is 2 for the field of the shape functions, 1 for a field that is linear between the corners, 0 if neither is
+        The degree is 2 for the field of the shape functions, 1 for a field linear between the corners, 0 if neither is
         determined, and -1 if no part of the facet is covered. `mass` (n_facets, k, k) are the integrals over the covered part
         [area].
         """
@@ -120,7 +120,7 @@ def independent_values(
 
     Returns
     -------
-    values : csr_array (m, k)
+    value_map : csr_array (m, k)
         Map from independent to nodal values [-].
     nodes : ndarray of int (k,)
         Node of each independent value.
@@ -136,18 +136,18 @@ def independent_values(
         if not (is_independent[nodes].any() or excluded[nodes].all()):
             is_independent[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
     independent = np.flatnonzero(is_independent)
-    values = nodal_map(side, excluded, independent)
+    value_map = nodal_map(side, excluded, independent)
     if (degree[degree >= 0] < 2).any():
-        values = _with_interpolated_rows(values, complete_facets, local[degree >= 0], is_independent, excluded)
-    return csr_array(values[:, independent]), independent
+        value_map = _with_interpolated_rows(value_map, complete_facets, local[degree >= 0], is_independent, excluded)
+    return csr_array(value_map[:, independent]), independent
 
 
 def _with_interpolated_rows(
-    values: csr_array, complete_facets: CompleteFacets, local: Indices, is_independent: Mask, excluded: Mask
+    value_map: csr_array, complete_facets: CompleteFacets, local: Indices, is_independent: Mask, excluded: Mask
 ) -> csr_array:
-    """Return the map `values` (m, m) with rows added for nodes that are neither independent nor excluded.
+    """Return the map `value_map` (m, m) with rows added for nodes that are neither independent nor excluded.
 
-    The value at a corner is the mean of those at the independent nodes of its facets. The values at other nodes are
+    The value at a corner is the mean of those at the independent nodes of its facets. The values at mid-side nodes are
     interpolated linearly between the corners. `local` (n, k) are the nodes of the facets that are at least partly covered.
     """
     m, has_value = len(is_independent), is_independent | excluded
@@ -157,13 +157,13 @@ def _with_interpolated_rows(
     selected = ~has_value[row] & is_independent[column]
     row, column = np.unique(np.column_stack([row[selected], column[selected]]), axis=0).T
     count = np.bincount(row, minlength=m)
-    values = csr_array(diags_array(has_value.astype(float)) @ values)
-    values = csr_array(values + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
+    value_map = csr_array(diags_array(has_value.astype(float)) @ value_map)
+    value_map = csr_array(value_map + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
     interpolation = lil_array((m, m))
     for facet, k in zip(*np.nonzero(~has_value[local[:, corners.shape[1] :]]), strict=True):
         # The facets on both sides of an edge have the same row.
         interpolation[local[facet, corners.shape[1] + k], corners[facet]] = to_corners[:, corners.shape[1] + k]
-    return csr_array(values + csr_array(interpolation) @ values)
+    return csr_array(value_map + csr_array(interpolation) @ value_map)
 
 
 @dataclass(eq=False)

@@ -42,7 +42,7 @@ class NodeToSegment(Formulation):
     ----------
     opposite : str
         ``"facet"`` to measure the gap to the opposite primary facet, or ``"node"`` to measure it to the nearest primary node.
-        The latter suits matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
+        ``"node"`` suits matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
     """
 
     opposite: str = "facet"
@@ -56,7 +56,7 @@ class NodeToSegment(Formulation):
         if self.opposite == "node" and not isinstance(self.primary, Surface):
             raise ContactError("a rigid obstacle has no nodes: leave out opposite = 'node'")
         for block in self.secondary.blocks:
-            # A uniform pressure on a facet must have compressive forces at all nodes.
+            # The equivalent nodal forces of a uniform pressure must be compressive at all nodes of a facet.
             if not all_nodes_carry_pressure(block.element):
                 primary_blocks = self.primary.blocks if isinstance(self.primary, Surface) else ()
                 can_swap = primary_blocks and all(all_nodes_carry_pressure(b.element) for b in primary_blocks)
@@ -77,7 +77,7 @@ class NodeToSegment(Formulation):
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
             normal = config.deformed(self.primary, self.points).nodal_normals[closest]
-        return replace(pairing, facet=nodes.facet[closest], xi=nodes.xi[closest], normal=normal, beyond=None)
+        return replace(pairing, facet=nodes.facet[closest], xi=nodes.xi[closest], normal=normal, overhang_xi=None)
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""

@@ -76,7 +76,7 @@ def _description(mesh: Mesh, number: int) -> str:
 def _border(mesh: Mesh, side: Surface, numbers: Indices) -> Mask:
     """Return whether the surface ends at its nodes (m,); `numbers` are the cell numbers of the facets.
 
-    It ends at ridges that belong to one facet only.
+    A surface ends at ridges that belong to one facet only.
 
     Raises ContactError, with the number of a facet, if the surface branches or adjacent facets have opposite orientations.
     """
@@ -118,7 +118,10 @@ def _ridges(side: Surface) -> tuple[Indices, Indices, Indices]:
 def _check_orientation(
     mesh: Mesh, side: Surface, numbers: Indices, first: Indices, second: Indices, consistent: Mask
 ) -> None:
-    """Raise ContactError if neighbours have opposite orientations; the message names a facet of the smaller part."""
+    """Raise ContactError if neighbours have opposite orientations; the message names a facet of the smaller part.
+
+    `first` and `second` (m,) are pairs of neighbours, and `consistent` (m,) marks those with the same orientation.
+    """
     if consistent.all():
         return
     graph = coo_array((np.ones(consistent.sum()), (first[consistent], second[consistent])), shape=(side.n_facets,) * 2)

@@ -75,7 +75,7 @@ class RigidSide:
         The slip of a point that moves from `initial_positions` to `positions` (n, dim) [length], while the pose changes from
         `initial_pose` to `pose`, is its displacement minus this result. The slip is the change of the position relative to
         the obstacle, expressed in the frame that is rotated by half the angle, and multiplied by the ratio of the arc to the
-        chord. It vanishes where a point sticks, and is tangential to the circle for a point at rest.
+        chord. The slip vanishes where a point sticks, and is tangential to the circle for a point at rest.
         """
         angle = pose.angle - initial_pose.angle
         shift = np.tile(pose.displacement - initial_pose.displacement, (len(positions), 1))

@@ -230,10 +230,10 @@ def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
     array([1.])
     """
     _check_positive(R=R)
-    sign, low = -_outward_sign(side), float(np.asarray(tip))
+    sign, tip_height = -_outward_sign(side), float(np.asarray(tip))
 
     def height(x: Array) -> tuple[Array, Array]:
-        return low + sign * (x * x).sum(axis=1) / (2 * R), sign * x / R
+        return tip_height + sign * (x * x).sum(axis=1) / (2 * R), sign * x / R
 
     return Height(height, side)
 

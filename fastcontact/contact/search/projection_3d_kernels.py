@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Closest point of a flat or curved facet in 3D, by minimisation of the distance from several starting points.
 
-A facet is a polynomial with coefficients ``terms`` (n_facets, m, 3) of the terms in `facet_tables`, on a polygon of
-``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
+A facet is a polynomial with the ``coefficients`` (n_facets, m, 3) of the terms in `facet_tables`. Its domain is a polygon
+with the ``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
 """
 
 from typing import NamedTuple
@@ -17,16 +17,15 @@ from fastcontact.round_off import ROUND_OFF
 
 
 class Facets(NamedTuple):
-    """Facets of one element type, relative to their centre, because round-off far from the origin would exceed STEP.
+    """Facets of one element type. Polynomials are relative to `centre`: round-off far from the origin would exceed STEP.
 
-    Up to `convexity_bound`, a local minimum of the distance is unique. For four nodes it is that of
-    `straight_3d_kernels.uniqueness_bound`. For more nodes it is the square of a distance, below which half the squared
-    distance is a convex function.
+    Up to `convexity_bound`, a local minimum of the distance is unique on the facet. With four nodes, the bound is
+    `straight_3d_kernels.uniqueness_bound`. With more nodes, it is a squared distance from the facet.
     """
 
     nodes: Array  # (n_facets, m, 3), relative to the origin [length]
     centre: Array  # (3,): centre of all nodes [length]
-    terms: Array  # (n_facets, m, 3): coefficients of the polynomials [length]
+    coefficients: Array  # (n_facets, m, 3): coefficients of the polynomials [length]
     deviation: Array  # (n_facets,): bound on a facet's deviation from the flat triangles between its nodes [length]
     convexity_bound: Array  # (n_facets,) [length^2]
 
@@ -41,7 +40,7 @@ class Domain(NamedTuple):
 
 @inlined_kernel
 def vector(vectors, f, k):
-    """Return vector `k` of facet `f` (n_facets, m, 3)."""
+    """Return vector `k` of facet `f` in `vectors` (n_facets, m, 3) as a tuple."""
     return vectors[f, k, 0], vectors[f, k, 1], vectors[f, k, 2]
 
 
@@ -52,20 +51,20 @@ def node(facets, f, k):
 
 
 @kernel
-def component(terms, f, d, s, t):
-    """Return one coordinate of facet `f` at (s, t) with its derivatives: value, s, t, ss, st, tt."""
-    m = terms.shape[1]
-    c1, c2 = terms[f, 1, d], terms[f, 2, d]
-    x, xs, xt, xss, xst, xtt = terms[f, 0, d] + c1 * s + c2 * t, c1, c2, 0.0, 0.0, 0.0
+def component(coefficients, f, d, s, t):
+    """Return coordinate `d` of facet `f` at (s, t), and its derivatives with respect to s, t, ss, st and tt."""
+    m = coefficients.shape[1]
+    c1, c2 = coefficients[f, 1, d], coefficients[f, 2, d]
+    x, xs, xt, xss, xst, xtt = coefficients[f, 0, d] + c1 * s + c2 * t, c1, c2, 0.0, 0.0, 0.0
     if m >= 4:
-        c = terms[f, 3, d]
+        c = coefficients[f, 3, d]
         x, xs, xt, xst = x + c * s * t, xs + c * t, xt + c * s, c
     if m >= 6:
-        c4, c5 = terms[f, 4, d], terms[f, 5, d]
+        c4, c5 = coefficients[f, 4, d], coefficients[f, 5, d]
         x, xs, xt = x + c4 * s * s + c5 * t * t, xs + 2.0 * c4 * s, xt + 2.0 * c5 * t
         xss, xtt = 2.0 * c4, 2.0 * c5
     if m >= 8:
-        c6, c7 = terms[f, 6, d], terms[f, 7, d]
+        c6, c7 = coefficients[f, 6, d], coefficients[f, 7, d]
         x, xs, xt = (
             x + (c6 * s + c7 * t) * s * t,
             xs + (2.0 * c6 * s + c7 * t) * t,
@@ -73,27 +72,27 @@ def component(terms, f, d, s, t):
         )
         xss, xst, xtt = xss + 2.0 * c6 * t, xst + 2.0 * (c6 * s + c7 * t), xtt + 2.0 * c7 * s
     if m >= 9:
-        c = terms[f, 8, d]
+        c = coefficients[f, 8, d]
         x, xs, xt = x + c * s * s * t * t, xs + 2.0 * c * s * t * t, xt + 2.0 * c * s * s * t
         xss, xst, xtt = xss + 2.0 * c * t * t, xst + 4.0 * c * s * t, xtt + 2.0 * c * s * s
     return x, xs, xt, xss, xst, xtt
 
 
 @kernel
-def half_square(terms, f, s, t, point):
+def half_square(coefficients, f, s, t, point):
     """Return half the squared distance from `point` to the point (s, t) of facet `f`."""
-    dx = point[0] - component(terms, f, 0, s, t)[0]
-    dy = point[1] - component(terms, f, 1, s, t)[0]
-    dz = point[2] - component(terms, f, 2, s, t)[0]
+    dx = point[0] - component(coefficients, f, 0, s, t)[0]
+    dy = point[1] - component(coefficients, f, 1, s, t)[0]
+    dz = point[2] - component(coefficients, f, 2, s, t)[0]
     return 0.5 * (dx * dx + dy * dy + dz * dz)
 
 
 @kernel
-def _expansion(terms, f, s, t, point):
+def _expansion(coefficients, f, s, t, point):
     """Return half the squared distance with its gradient (2) and Hessian (3: ss, st, tt)."""
     value, gs, gt, hss, hst, htt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for d in range(3):
-        x, xs, xt, xss, xst, xtt = component(terms, f, d, s, t)
+        x, xs, xt, xss, xst, xtt = component(coefficients, f, d, s, t)
         r = point[d] - x
         value += 0.5 * r * r
         gs -= r * xs
@@ -106,7 +105,7 @@ def _expansion(terms, f, s, t, point):
 
 @kernel
 def _is_feasible(sides, s, t, ps, pt, size):
-    """Return whether a step (ps, pt) from (s, t) stays in the domain at all sides on which (s, t) lies."""
+    """Return whether a step (ps, pt) of length `size` from (s, t) stays in the domain at all sides on which (s, t) lies."""
     for k in range(sides.shape[0]):
         on_side = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ROUND_OFF
         if on_side and sides[k, 0] * ps + sides[k, 1] * pt > 1e-14 * size:
@@ -153,10 +152,11 @@ def _newton_step(sides, s, t, gs, gt, hss, hst, htt):
 
 
 @kernel
-def _downhill(terms, f, s, t, sides, point, value, hss, hst, htt):
+def _downhill(coefficients, f, s, t, sides, point, value, hss, hst, htt):
     """Return a step that decreases the distance from a stationary point (s, t); zeros if the point is a minimum.
 
-    Candidates are the direction of the smallest curvature of the Hessian, and those along the sides.
+    Candidates are the direction of the smallest curvature of the Hessian, and those along the sides. `value` is half the
+    squared distance at (s, t).
     """
     middle, radius = 0.5 * (hss + htt), np.sqrt(0.25 * ((hss - htt) * (hss - htt)) + hst * hst)
     if middle - radius >= -1e-9 * (abs(middle) + radius):
@@ -168,9 +168,10 @@ def _downhill(terms, f, s, t, sides, point, value, hss, hst, htt):
         if k >= 0:
             us, ut = -sides[k, 1], sides[k, 0]
         length = 0.1 / np.sqrt(us * us + ut * ut)
-        for sign in (length, -length):
-            ps, pt = sign * us, sign * ut
-            if _inside(sides, s + ps, t + pt) and half_square(terms, f, s + ps, t + pt, point) < value * (1.0 - 1e-12):
+        for step in (length, -length):
+            ps, pt = step * us, step * ut
+            is_lower = half_square(coefficients, f, s + ps, t + pt, point) < value * (1.0 - 1e-12)
+            if is_lower and _inside(sides, s + ps, t + pt):
                 return ps, pt
     return 0.0, 0.0
 
@@ -185,7 +186,7 @@ def _inside(sides, s, t):
 
 
 @kernel
-def descend(terms, f, s, t, sides, point):
+def descend(coefficients, f, s, t, sides, point):
     """Return the local minimum (s, t) of the distance from `point` to facet `f`, and whether the iteration converged.
 
     Newton's method minimises the squared distance over the polygon of the reference domain. It is an active-set method that
@@ -193,11 +194,11 @@ def descend(terms, f, s, t, sides, point):
     """
     size = np.inf
     for _ in range(MAX_ITERATIONS):
-        value, gs, gt, hss, hst, htt = _expansion(terms, f, s, t, point)
+        value, gs, gt, hss, hst, htt = _expansion(coefficients, f, s, t, point)
         ps, pt = _newton_step(sides, s, t, gs, gt, hss, hst, htt)
         size = max(abs(ps), abs(pt))
         if not size > STEP:
-            ps, pt = _downhill(terms, f, s, t, sides, point, value, hss, hst, htt)
+            ps, pt = _downhill(coefficients, f, s, t, sides, point, value, hss, hst, htt)
             if size <= STEP and (ps != 0.0 or pt != 0.0):
                 s, t = s + ps, t + pt
                 continue
@@ -205,12 +206,12 @@ def descend(terms, f, s, t, sides, point):
         length = 1.0
         for k in range(sides.shape[0]):
             rate = sides[k, 0] * ps + sides[k, 1] * pt
-            if rate > ROUND_OFF * size:  # along a side, it is round-off
+            if rate > ROUND_OFF * size:  # the rate of a step along the side is round-off
                 distance = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
                 length = min(length, max(distance, 0.0) / rate)
         if length * size > 1e-6:  # in smaller steps round-off exceeds the decrease
             for _ in range(40):
-                if half_square(terms, f, s + length * ps, t + length * pt, point) <= value * (1.0 + 1e-14):
+                if half_square(coefficients, f, s + length * ps, t + length * pt, point) <= value * (1.0 + 1e-14):
                     break
                 length *= 0.5
         s, t = s + length * ps, t + length * pt
@@ -225,35 +226,35 @@ def project(facets, f, domain, point, reach):
     triangle. With more than four nodes, a minimum within `convexity_bound` is unique. Otherwise the descent is restarted on
     every triangle that may contain a closer point. The returned distance is infinite if its square exceeds `reach`.
     """
-    terms, deviation = facets.terms, facets.deviation[f]
+    coefficients, deviation = facets.coefficients, facets.deviation[f]
     nodes, triangles, sides = domain
-    s, t, flat = 0.0, 0.0, np.inf
+    s, t, flat_square = 0.0, 0.0, np.inf
     for k in range(triangles.shape[0]):
         a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
-        if square < flat:
-            s, t, flat = a, b, square
-    least = max(np.sqrt(flat) - deviation, 0.0)
+        if square < flat_square:
+            s, t, flat_square = a, b, square
+    least = max(np.sqrt(flat_square) - deviation, 0.0)
     if least * least > reach:
         return s, t, np.inf, True
     tried_s, tried_t = s, t
-    s, t, converged = descend(terms, f, s, t, sides, point)
-    best = half_square(terms, f, s, t, point)
-    if converged and terms.shape[1] > 4 and 2.0 * best < facets.convexity_bound[f]:
+    s, t, converged = descend(coefficients, f, s, t, sides, point)
+    best = half_square(coefficients, f, s, t, point)
+    if converged and coefficients.shape[1] > 4 and 2.0 * best < facets.convexity_bound[f]:
         return s, t, best, True
     for k in range(triangles.shape[0] if deviation > 0.0 else 0):
         a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
         largest = np.sqrt(2.0 * best) + deviation
         if square > largest * largest or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
             continue
-        a, b, success = descend(terms, f, a, b, sides, point)
-        value = half_square(terms, f, a, b, point)
+        a, b, success = descend(coefficients, f, a, b, sides, point)
+        value = half_square(coefficients, f, a, b, point)
         if value < best:
             s, t, best, converged = a, b, value, success
     side = minus(node(facets, f, 1), node(facets, f, 0))
     # Near the centres of curvature the distance has several minima on one triangle, so that the descent starts at every node.
     for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * deviation > dot(side, side) else 0):
-        a, b, success = descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
-        value = half_square(terms, f, a, b, point)
+        a, b, success = descend(coefficients, f, nodes[k, 0], nodes[k, 1], sides, point)
+        value = half_square(coefficients, f, a, b, point)
         if value < best:
             s, t, best, converged = a, b, value, success
     return s, t, best, converged
@@ -287,14 +288,14 @@ def onto_sides(sides, s, t):
 
 
 @kernel
-def frame(terms, f, s, t, point, sides, nodes):
+def normal_and_overhang(coefficients, f, s, t, point, sides, nodes):
     """Return the unit normal of facet `f` at (s, t) and the overhang of `point` beyond the domain's sides.
 
     The overhang, in facet lengths, follows from the point's reference coordinates on the tangent plane of the facet.
     """
-    x, xs, xt, _, _, _ = component(terms, f, 0, s, t)
-    y, ys, yt, _, _, _ = component(terms, f, 1, s, t)
-    z, zs, zt, _, _, _ = component(terms, f, 2, s, t)
+    x, xs, xt, _, _, _ = component(coefficients, f, 0, s, t)
+    y, ys, yt, _, _, _ = component(coefficients, f, 1, s, t)
+    z, zs, zt, _, _, _ = component(coefficients, f, 2, s, t)
     p, q, r = (xs, ys, zs), (xt, yt, zt), minus(point, (x, y, z))
     pp, pq, qq, pr, qr = dot(p, p), dot(p, q), dot(q, q), dot(p, r), dot(q, r)
     determinant = pp * qq - pq * pq

@@ -52,7 +52,7 @@ def _project(nodes, f, x, y):
             if change < 1e-15:
                 break
     # At a common node the distances of all its facets must be equal, so that the choice between them does not depend on
-    # round-off. A point opposite the node may lie within one of them by a rounding error.
+    # round-off. The projection of a point opposite the node may lie inside one of these facets by a rounding error.
     if abs(s) >= 1.0 - ROUND_OFF:
         end = 0 if s < 0.0 else 1
         s = 2.0 * end - 1.0
@@ -129,16 +129,16 @@ def _write(result, i, nodes, f, s, x, y):
         if nodes.shape[1] == 3:
             coordinate += c * nodes[f, 2, d]
         result.position[i, d] = coordinate
-        gap = (x if d == 0 else y) - coordinate
-        square += gap * gap
+        difference = (x if d == 0 else y) - coordinate
+        square += difference * difference
     result.distance[i] = np.sqrt(square)
 
 
 @kernel
-def _newton(x, y, corners, normals, f, s):
+def _newton(x, y, nodes, normals, f, s):
     """Return s where (x, y) lies on the normal of facet f, extended beyond its ends, and whether the iteration converged."""
     for _ in range(MAX_ITERATIONS):
-        px, py, tx, ty, _, _ = _curve(corners, f, s)
+        px, py, tx, ty, _, _ = _curve(nodes, f, s)
         nx, ny, mx, my, _, _ = _curve(normals, f, s)
         dx, dy, across = x - px, y - py, tx * ny - ty * nx
         slope = (dx * my - dy * mx) - across
@@ -155,25 +155,25 @@ def _newton(x, y, corners, normals, f, s):
 
 
 @interpretable_kernel
-def along_normals(points, corners, normals, neighbour, facet, xi, overhang):
+def along_normals(points, nodes, normals, neighbour, facet, xi, overhang):
     """Replace closest-point projections (facet, xi) by projections along the interpolated normals.
 
     Parameters
     ----------
     points : ndarray (n, 2)
         Positions [length].
-    corners, normals : ndarray (n_facets, k, 2)
+    nodes, normals : ndarray (n_facets, k, 2)
         Nodes of the facets and unit normals there, ends first; k is 2 or 3. With three nodes, a straight facet has its middle
         as the third one.
     neighbour : ndarray of int (n_facets, 2)
-        The facet beyond each end, or -1. Its end 1 is shared beyond end 0, and its end 0 beyond end 1.
+        The facet that continues the line at each end, or -1. At end 0 it is joined by its end 1, and at end 1 by its end 0.
     facet, xi, overhang : ndarray (n,)
         Closest points, changed in place where the projection succeeds.
     """
     for i in range(points.shape[0]):
         f, s, previous = facet[i], xi[i], -1
         for _ in range(MAX_ITERATIONS):
-            s, converged = _newton(points[i, 0], points[i, 1], corners, normals, f, s)
+            s, converged = _newton(points[i, 0], points[i, 1], nodes, normals, f, s)
             if not converged or 0.5 * (abs(s) - 1.0) > LARGEST_OVERHANG:
                 break
             if abs(s) <= 1.0:

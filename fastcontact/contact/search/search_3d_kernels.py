@@ -5,7 +5,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
-from fastcontact.contact.search.projection_3d_kernels import component, frame, onto_sides, project, vector
+from fastcontact.contact.search.projection_3d_kernels import component, normal_and_overhang, onto_sides, project, vector
 from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, on_bilinear, on_flat, plus_multiple, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
@@ -14,9 +14,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 def closest_facets(points, order, begin, end, facets, domain, numbers, tree, result):
     """Project points (n, 3) onto their closest facets.
 
-    If several facets meet at the closest point, the one with the lowest number is chosen. The arguments are those of
-    `search_2d_kernels.closest_facets`. If a projection fails, the distance is NaN. If a point is not finite, the facet is -1
-    as well.
+    If several facets meet at the closest point, the one with the lowest number is chosen. `facets` and `domain` are described
+    in `projection_3d_kernels`, and the other arguments in `search_2d_kernels.closest_facets`. If a projection fails, the
+    distance is NaN. If a point is not finite, the facet is -1 as well.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     centre = facets.centre[0], facets.centre[1], facets.centre[2]
@@ -59,11 +59,11 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, res
 def _write(result, i, facets, f, domain, s, t, point, foot, inside, converged):
     """Fill the results for point `i`, except the number of the facet `f`."""
     if inside:
-        a, b, c = vector(facets.terms, f, 1), vector(facets.terms, f, 2), _twist(facets.terms, f)
+        a, b, c = vector(facets.coefficients, f, 1), vector(facets.coefficients, f, 2), _twist(facets.coefficients, f)
         normal, overhang = unit(cross(plus_multiple(a, c, t), plus_multiple(b, c, s))), 0.0
     else:
         s, t = onto_sides(domain.sides, s, t)
-        normal, overhang = frame(facets.terms, f, s, t, point, domain.sides, domain.nodes)
+        normal, overhang = normal_and_overhang(facets.coefficients, f, s, t, point, domain.sides, domain.nodes)
     offset = minus(point, foot)
     result.xi[i, 0], result.xi[i, 1], result.overhang[i] = s, t, overhang
     if converged and np.isfinite(normal[0]):
@@ -73,9 +73,9 @@ def _write(result, i, facets, f, domain, s, t, point, foot, inside, converged):
 
 
 @inlined_kernel
-def _twist(terms, f):
+def _twist(coefficients, f):
     """Return the coefficient of the term s t of a facet with three or four nodes."""
-    return vector(terms, f, 3) if terms.shape[1] > 3 else (0.0, 0.0, 0.0)
+    return vector(coefficients, f, 3) if coefficients.shape[1] > 3 else (0.0, 0.0, 0.0)
 
 
 @inlined_kernel
@@ -84,11 +84,11 @@ def _projected(facets, f, domain, point, reach):
 
     The last two results are whether the projection converged, and whether it certainly lies inside the facet.
     """
-    terms = facets.terms
-    if terms.shape[1] <= 4:
-        o, a, b, c = vector(terms, f, 0), vector(terms, f, 1), vector(terms, f, 2), _twist(terms, f)
+    C = facets.coefficients
+    if C.shape[1] <= 4:
+        o, a, b, c = vector(C, f, 0), vector(C, f, 1), vector(C, f, 2), _twist(C, f)
         r = minus(point, o)
-        if terms.shape[1] == 3:
+        if C.shape[1] == 3:
             s, t = on_flat(r, a, b)
             inside, d = s > ROUND_OFF and t > ROUND_OFF and 1.0 - s - t > ROUND_OFF, 0.0
         else:
@@ -98,10 +98,10 @@ def _projected(facets, f, domain, point, reach):
         offset = minus(point, foot)
         if d == np.inf:
             return s, t, foot, np.inf, True, False
-        if terms.shape[1] == 3 or (abs(dot(offset, c)) < facets.convexity_bound[f] and d >= 0.0):
+        if C.shape[1] == 3 or (abs(dot(offset, c)) < facets.convexity_bound[f] and d >= 0.0):
             return s, t, foot, dot(offset, offset), True, inside
     s, t, d, converged = project(facets, f, domain, point, reach)
-    foot = component(terms, f, 0, s, t)[0], component(terms, f, 1, s, t)[0], component(terms, f, 2, s, t)[0]
+    foot = component(C, f, 0, s, t)[0], component(C, f, 1, s, t)[0], component(C, f, 2, s, t)[0]
     offset = minus(point, foot)
     return s, t, foot, np.inf if d == np.inf else dot(offset, offset), converged, False
 

@@ -118,8 +118,8 @@ def on_bilinear(r, a, b, c, reach):
     s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
     if abs(s) > 1.0 or abs(t) > 1.0:
         # In-plane distance to the parallelogram, from which the facet deviates by at most |c|.
-        beyond = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
-        if beyond > reach + np.sqrt(cc):
+        distance = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
+        if distance > reach + np.sqrt(cc):
             return s, t, np.inf
     # If the first search leaves the facet, a second one starts inside it, since there may still be a minimum inside.
     for _ in range(2):
@@ -141,7 +141,10 @@ def on_bilinear(r, a, b, c, reach):
 
 @kernel
 def _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t):
-    """Return the point that Newton's method reaches from (s, t), and whether it is a stationary point inside the facet."""
+    """Return the point that Newton's method reaches from (s, t), and whether it is a stationary point inside the facet.
+
+    The other arguments are scalar products of the vectors of `on_bilinear`.
+    """
     for _ in range(8):
         if not (abs(s) < 1.0 - ROUND_OFF and abs(t) < 1.0 - ROUND_OFF):
             return s, t, False

@@ -148,8 +148,8 @@ class Element:
 def quadratic(name: str, linear: Element, functions: Functions, **arguments: Any) -> Element:
     """Return a quadratic element, whose facets are those of the `linear` element with their mid-side and centre nodes.
 
-    `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions, and `arguments` are further arguments of
-    `Element`.
+    The pair `functions` (n_nodes, dim) [-] consists of its nodes and its shape functions, and `arguments` are further
+    arguments of `Element`.
     """
     nodes, shape = functions
     facets = []

@@ -15,7 +15,7 @@ from fastcontact.mesh.quadrature import gauss_line, tensor_product, triangle, tr
 
 NODES, shape = product(np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)]), TRI3, LINE2)
 Z = NODES[:, 2]
-TWICE = np.tile(np.arange(3), 2)  # number of the triangle corner below or above each of the six corners
+TRIANGLE_CORNER = np.tile(np.arange(3), 2)  # number of the triangle corner below or above each of the six corners
 
 WEDGE6 = Element(
     "wedge6", NODES, edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
@@ -30,7 +30,7 @@ SIDE = Z[A]
 
 def shape_15(xi: AnyArray) -> AnyArray:
     """Return the shape functions (m, 15) [-] at `xi` (m, 3) [-]."""
-    L, z = TRI3.shape(xi[:, :2])[:, TWICE], xi[:, 2:]
+    L, z = TRI3.shape(xi[:, :2])[:, TRIANGLE_CORNER], xi[:, 2:]
     corner = shape(xi) * (2 * L - 2 + z * Z)
     horizontal = 2 * L[:, A] * L[:, B] * (1 + z * SIDE)
     return np.column_stack([corner, horizontal, L[:, :3] * (1 - z * z)])

@@ -16,7 +16,7 @@ from fastcontact.mesh.files.meshio_content import VERTEX, Block, FileContent, bu
 from fastcontact.mesh.mesh import Mesh
 
 # Element types by keyword.
-KINDS = {
+TYPES = {
     "POI1": VERTEX, "SEG2": "line2", "SEG3": "line3", "TRIA3": "tri3", "TRIA6": "tri6", "QUAD4": "quad4", "QUAD8": "quad8",
     "QUAD9": "quad9", "TETRA4": "tet4", "TETRA10": "tet10", "PENTA6": "wedge6", "PENTA15": "wedge15", "PENTA18": "wedge18",
     "PYRAM5": "pyramid5", "PYRAM13": "pyramid13", "HEXA8": "hex8", "HEXA20": "hex20", "HEXA27": "hex27",
@@ -99,8 +99,8 @@ class _Content:
             for name, *coordinates in self._rows(keyword, line, words, 1 + COORDINATES[keyword]):
                 self._points[name[0]] = len(self._coordinates)
                 self._coordinates.append([self._number(word) for word in coordinates])
-        elif keyword in KINDS:
-            count = 1 if KINDS[keyword] == VERTEX else elements.get(KINDS[keyword]).n_nodes
+        elif keyword in TYPES:
+            count = 1 if TYPES[keyword] == VERTEX else elements.get(TYPES[keyword]).n_nodes
             block = self._cells.setdefault(keyword, {})
             for name, *nodes in self._rows(keyword, line, words, 1 + count):
                 points = list(map(self._point, nodes))
@@ -110,7 +110,7 @@ class _Content:
                 raise self._error(line, f"{keyword} has no name")
             self._groups[keyword].setdefault(words[0][0], []).extend(words[1:])
         elif keyword not in IGNORED_KEYWORDS:
-            keywords = ", ".join([*COORDINATES, *KINDS, *self._groups])
+            keywords = ", ".join([*COORDINATES, *TYPES, *self._groups])
             raise self._error(line, f"{keyword[:40]} is not known; a mesh has {keywords}")
 
     def mesh(self) -> tuple[Mesh, dict[str, int]]:
@@ -123,7 +123,7 @@ class _Content:
             row_of = {name: row for row, name in enumerate(block)}
             members = {name: _numbers(words, row_of) for name, words in cell_groups.items()}
             nodes = np.array(list(block.values()), np.intp)
-            blocks.append(Block(KINDS[keyword], nodes, {name: rows for name, rows in members.items() if len(rows)}))
+            blocks.append(Block(TYPES[keyword], nodes, {name: rows for name, rows in members.items() if len(rows)}))
         points = {name: _numbers(members, self._points) for name, members in point_groups.items()}
         return build_mesh(np.array(self._coordinates), blocks, points, cell_groups)
 

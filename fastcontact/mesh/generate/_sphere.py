@@ -62,11 +62,11 @@ def sphere_on_block(
     contact_size : float, optional
         Length of the edges at the contact; by default R/50 [length].
     contact_radius : float, optional
-        Distance from the pole up to which edges have the length `contact_size`; by default R/10 [length]. Below the
-        surfaces this fine region is half as deep.
+        Distance from the pole up to which edges have the length `contact_size`; by default R/10 [length]. The depth of
+        this fine region below the surfaces is half this distance.
     growth : float
-        Increase of the edge length per unit distance outside this region, until `size` is reached [-]. It limits the
-        accuracy that a smaller `contact_size` alone can achieve.
+        Increase of the edge length per unit distance outside this region, until `size` is reached [-]. The growth limits
+        the accuracy that a smaller `contact_size` alone can achieve.
 
     Returns
     -------

@@ -30,8 +30,8 @@ _CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 def triangulated_body(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, with all cells in the group `solid`.
 
-    Each of the `sides` (n, 2) [length] consists of a name and nodes. They are in counter-clockwise order, and each begins at
-    the end of the previous one. `spacing` defines the longest inner edges.
+    Each of the `sides` (n, 2) [length] consists of a name and its nodes. The sides are in counter-clockwise order, and each
+    begins where the previous one ends. `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
     points, triangles = triangulate(outline, spacing)
@@ -65,7 +65,10 @@ def triangulate(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
 
 
 def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
-    """Return the points of a triangulation with edges of admissible length, or None if there are still longer edges."""
+    """Return the points of a triangulation with edges of admissible length, or None if there are still longer edges.
+
+    Inner points initially have the distance ``density * spacing``.
+    """
     n_fixed = len(outline)
     points = np.vstack([outline, inner_seeds(outline, spacing, density)])
     movable = np.arange(len(points)) >= n_fixed
@@ -283,7 +286,10 @@ def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
 
 
 def _sweep(points: Array, movable: Mask, edges: Indices, stars: Indices, limit: Array, radius: float) -> bool:
-    """Try to move every point with a small angle, the worst first, in place, and return whether any point has moved."""
+    """Try to move every point with a small angle, the worst first, in place, and return whether any point has moved.
+
+    `limit` (n,) are the longest admissible edges at the points, and `radius` is the length of trial moves relative to them.
+    """
     quality = np.full(len(points), np.inf)
     quality[movable] = _star_quality(points[movable, None], points, stars[movable], limit[movable])[:, 0]
     quality[quality >= _GOOD_SINE] = np.inf

@@ -27,8 +27,8 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     ----------
     mesh : Mesh
     group : str
-        Group of facets between solid cells. They must divide a body completely, so that the edge of the cut lies on the
-        surface of the body.
+        Group of facets between solid cells. The facets must divide a body completely, so that the edge of the cut lies on
+        the surface of the body.
     normal : sequence of float (dim,), optional
         Direction from the cut to the side whose cells receive the new nodes [-]; by default the normal of the plane
         fitted to the facets, oriented such that its largest component is positive.

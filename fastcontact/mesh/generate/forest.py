@@ -28,8 +28,8 @@ RED = {
     "tri3": [[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]],
     "quad4": [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]],
 }
-# Cells that replace a leaf by element type and number of divided edges. The leaf is rotated such that edge 0, or the edges 0
-# and 2, are divided.
+# Cells that replace a leaf, for its element type and number of divided edges. The leaf is first rotated such that edge 0, or
+# edges 0 and 2, are divided.
 GREEN: dict[tuple[str, int], dict[str, list[list[int]]]] = {
     ("tri3", 1): {"tri3": [[0, 3, 2], [3, 1, 2]]},
     ("quad4", 1): {"tri3": [[0, 4, 3], [4, 1, 2], [4, 2, 3]]},

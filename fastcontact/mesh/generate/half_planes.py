@@ -36,8 +36,8 @@ def graded_block(
 ) -> Mesh:
     """Block under an indenter, with its top at height 0 and a mesh that is refined at the origin.
 
-    Only the part x >= 0 is modelled, in 3D also y >= 0. It represents a half-plane or half-space in contact with a rigid
-    obstacle. If its width and depth are 8 contact radii, the relative error of the pressure is a few thousandths. The height
+    Only the part x >= 0 is modelled, in 3D also y >= 0. The block represents a half-plane or half-space in contact with a
+    rigid obstacle. If its width and depth are 8 contact radii, the error of the pressure is a few thousandths. The height
     is the last coordinate, y in 2D and z in 3D. Groups of cells: BLOCK, TOP, CONTACT (the finely meshed part of the top),
     BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in 3D, SYMMETRY_Y (y = 0). Group of points: POLE (the origin).
 

@@ -13,7 +13,7 @@ from fastcontact._tools.argument_types import finite_vector, typed
 from fastcontact._tools.units import named_units
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.elasticity.incompatible_modes import BENDING
+from fastcontact.elasticity.incompatible_modes import ELEMENTS_WITH_MODES
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load, Value, check_number, check_solids, evaluated, solid_rows
 from fastcontact.elasticity.material_field import MaterialField, material_field
@@ -251,7 +251,7 @@ class ModelBase(NameSuggestions):
 
     def uses_incompatible_modes(self) -> list[bool]:
         """Return for each material whether linear quadrangles and hexahedra of this material have incompatible modes."""
-        possible = self.kinematics != "axisymmetric" and any(name in BENDING for name in self.mesh.solids)
+        possible = self.kinematics != "axisymmetric" and any(name in ELEMENTS_WITH_MODES for name in self.mesh.solids)
         return [possible and material.incompatible_modes for material, _ in self.materials]
 
     @property

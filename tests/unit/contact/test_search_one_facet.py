@@ -46,9 +46,9 @@ def minima(facets, m, point):
     shape = domain(m)
     found = []
     for s, t in grid(OF_SIZE[m], 7):
-        s, t, converged = projection3d.descend(facets.terms, 0, s, t, shape.sides, point)
+        s, t, converged = projection3d.descend(facets.coefficients, 0, s, t, shape.sides, point)
         assert converged
-        found.append((s, t, 2.0 * projection3d.half_square(facets.terms, 0, s, t, point)))
+        found.append((s, t, 2.0 * projection3d.half_square(facets.coefficients, 0, s, t, point)))
     return np.array(found)
 
 
@@ -66,7 +66,7 @@ def test_within_the_bound_there_is_one_minimum(seed, m, bend, near):
     foot, direction = on(corners[0], m, place)[0], rng.normal(size=3)
     if m == 4:
         # Along the normal at the foot, which then is a stationary point, as far as |(r - X) . c| stays below the bound.
-        a, b, c = facets.terms[0, 1:]
+        a, b, c = facets.coefficients[0, 1:]
         direction = np.cross(a + place[1] * c, b + place[0] * c)
         most = facets.convexity_bound[0] / max(abs(direction @ c), 1e-300)
     else:
@@ -92,7 +92,7 @@ def test_beyond_the_bound_there_may_be_two():
 def compare_bilinear(corners, point):
     """Check the closed form against the general search, wherever the closed form claims to be right."""
     facets, _, _ = prepared(corners)
-    o, a, b, c = (tuple(term) for term in facets.terms[0])
+    o, a, b, c = (tuple(term) for term in facets.coefficients[0])
     s, t, square = straight_3d_kernels.on_bilinear(tuple(np.subtract(point, o)), a, b, c, np.inf)
     rest = np.subtract(point, on(corners[0], 4, (s, t))[0])
     if not (square >= 0.0 and abs(rest @ c) < facets.convexity_bound[0]):
@@ -139,7 +139,7 @@ def test_degenerate_and_strongly_warped_facets_are_right_or_refused(seed):
 def test_a_bilinear_facet_out_of_reach_is_told_at_once():
     corners = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 1, 0.1], [0, 1, 0]]])
     facets, _, _ = prepared(corners)
-    o, a, b, c = (tuple(term) for term in facets.terms[0])
+    o, a, b, c = (tuple(term) for term in facets.coefficients[0])
     far = tuple(np.subtract((5.0, 0.5, 0.0), o))
     assert straight_3d_kernels.on_bilinear(far, a, b, c, 3.9)[2] == np.inf
     assert straight_3d_kernels.on_bilinear(far, a, b, c, 4.1)[2] == pytest.approx(16.0, abs=0.01)
@@ -179,7 +179,7 @@ def test_facets_are_prepared_as_they_are(seed, m, bend):
     facets, low, high = prepared(corners)
     xi = grid(OF_SIZE[m], 21)
     places = on(corners[0], m, xi)
-    polynomial = np.array([[projection3d.component(facets.terms, 0, d, *place)[0] for d in range(3)] for place in xi])
+    polynomial = np.array([[projection3d.component(facets.coefficients, 0, d, *x)[0] for d in range(3)] for x in xi])
     assert np.abs(polynomial - places).max() < 1e-13
     assert (places >= low - 1e-13).all()
     assert (places <= high + 1e-13).all()

@@ -7,7 +7,7 @@ from refusals import refused
 from test_assembly import MESHES, plane_patch, twin
 
 import fastcontact as fc
-from fastcontact.elasticity.material_axes import PAIRS
+from fastcontact.elasticity.material_axes import TENSOR_INDICES
 from fastcontact.elasticity.stiffness import is_isotropic, stiffness
 
 pytestmark = pytest.mark.pairwise
@@ -55,11 +55,11 @@ def test_turned_moduli_are_those_of_the_tensor_turned_index_by_index(make):
     D, R = make(None).moduli("3d"), np.array([*TILTED, np.cross(*TILTED)])
     R /= np.linalg.norm(R, axis=1, keepdims=True)
     C = np.empty((3,) * 4)
-    for row, (i, j) in enumerate(PAIRS):
-        for column, (k, m) in enumerate(PAIRS):
+    for row, (i, j) in enumerate(TENSOR_INDICES):
+        for column, (k, m) in enumerate(TENSOR_INDICES):
             C[i, j, k, m] = C[j, i, k, m] = C[i, j, m, k] = C[j, i, m, k] = D[row, column]
     turned = np.einsum("ai,bj,ck,dl,abcd->ijkl", R, R, R, R, C)
-    expected = [[turned[i, j, k, m] for k, m in PAIRS] for i, j in PAIRS]
+    expected = [[turned[i, j, k, m] for k, m in TENSOR_INDICES] for i, j in TENSOR_INDICES]
     np.testing.assert_allclose(make(TILTED).moduli("3d"), expected, rtol=1e-10, atol=1e-9 * np.abs(D).max())
 
 

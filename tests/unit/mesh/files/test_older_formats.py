@@ -12,7 +12,7 @@ from fastcontact.mesh.files import aster_mail
 pytestmark = pytest.mark.usefixtures("meshio_here")
 
 GMSH_KINDS = {"line2": 1, "tri3": 2, "quad4": 3, "tet4": 4, "hex8": 5, "wedge6": 6, "pyramid5": 7}
-MAIL_KINDS = {element: keyword for keyword, element in aster_mail.KINDS.items()}
+MAIL_KINDS = {element: keyword for keyword, element in aster_mail.TYPES.items()}
 SOLIDS = [name for name, element in elements.ELEMENTS.items() if element.dim > 1]
 
 
