@@ -338,7 +338,7 @@ def newton_step(
     displacement = step.problem.displacement(u)
     if nodes is not None:
         solution = nodes.with_distributed_forces(solution, constraints, u)
-    if solution.response is None or not (geometries := _linearised(constraints, solution, displacement)):
+    if solution.response is None or not (geometries := linearised_pairs(constraints, solution, displacement)):
         return None
     try:
         respond = solution.response()
@@ -375,7 +375,7 @@ def newton_step(
     return next_pairing, response_size / (largest_change * largest(v) or 1.0)
 
 
-def _linearised(
+def linearised_pairs(
     constraints: StackedConstraints, solution: Solution, displacement: Array
 ) -> list[tuple[slice, Linearised]]:
     """Return the rows and the linearised geometry of each pair in contact; empty if one of them has no derivatives."""

@@ -1,10 +1,11 @@
 """Contact forces and gaps as functions of the configuration of the pairing, and their derivatives.
 
 Contact is paired on the deformed configuration: forces ``B.T multiplier`` and gaps ``gap0 + B u`` also depend on the
-displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). These derivatives are taken by
-finite differences of the pairing alone, which is cheap and smooth; no load step is solved again. A point of a surface only
-affects the constraints around it, so that distant points are moved simultaneously (Curtis, Powell and Reid, J. Inst. Math.
-Appl. 13, 1974).
+displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). In node-to-segment and
+continuous contact their directional derivatives are those of Newton's method, see `contact.linearised_geometry`. In mortar
+contact, Newton's method neglects the variation of the segments, and the derivatives are finite differences of the pairing
+alone. A point of a surface only affects the constraints around it, so that distant points are moved simultaneously (Curtis,
+Powell and Reid, J. Inst. Math. Appl. 13, 1974).
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from scipy.sparse import csr_array, eye_array, hstack, kron, vstack
 
 from fastcontact._tools.records import record, replace
 from fastcontact.analysis.contact_result import closed_node_pressures
+from fastcontact.analysis.geometry_loop import linearised_pairs
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices, Mask, largest
-from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.constraints import Linearised, StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import entry_rows
@@ -141,9 +143,9 @@ class MovingContact:
             nodes = len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0
             shape = len(self.u) + len(self.active) + nodes, len(self.u) + len(lifts)
             return csr_array(shape), csr_array(shape)
-        dofs = self._moving_dofs()
+        dofs = self._moving_dofs
         derivatives = self._differences(_independent_groups(dofs, self._pattern, self.problem.model.mesh.dim))
-        if not self._is_consistent(0.5 * (derivatives[0] + derivatives[1]), dofs):
+        if not self._is_consistent(0.5 * (derivatives[0] + derivatives[1])):
             derivatives = self._differences([np.array([dof]) for dof in dofs])
         along_lifts = [self._one_sided(lift / (largest(lift) or 1.0)) for lift in lifts]
         columns = [[csr_array(pair[side][:, None]) for pair in along_lifts] for side in (0, 1)]
@@ -162,8 +164,9 @@ class MovingContact:
         jump.eliminate_zeros()
         return jump
 
+    @cached_property
     def _moving_dofs(self) -> Indices:
-        """Return the unknowns that active constraints may depend on."""
+        """Unknowns that active constraints may depend on."""
         dim, contact_dofs = self.problem.model.mesh.dim, self.problem.contact_dofs
         points = np.unique(self._pattern.nonzero()[1])
         obstacle_dofs = contact_dofs[contact_dofs >= self.problem.model.n_dofs]
@@ -220,8 +223,31 @@ class MovingContact:
         """Forces, gaps and pressures at the displacements of the step, see `sample_at`."""
         return self.sample_at(self.u)
 
+    @cached_property
+    def _linearised(self) -> list[list[tuple[slice, Linearised]]]:
+        """Linearised pairs on either side of the configuration, whose derivatives differ at kinks; empty without them.
+
+        In mortar contact, for force-driven obstacles and for active constraints without force, the derivatives in Newton's
+        method are approximate or incomplete.
+        """
+        problem, u, is_complete = self.problem, self.u, self.solution.multiplier[self.active].all()
+        if not is_complete or problem.force_driven.pairs or any(p.name == "mortar" for p in problem.pairs.values()):
+            return []
+        shift = self.increment * problem.system.displacement(self._direction, np.zeros(len(u)))
+        paired = (self.constraints_at(u + side * shift) for side in (1.0, -1.0))
+        return [linearised_pairs(constraints, self.solution, problem.displacement(u)) for constraints in paired]
+
     def _one_sided(self, motion: Array) -> tuple[Array, Array]:
         """Return the forward and the backward derivative of `sample_at` along a motion (n_dofs,) of the points."""
+        if any(self._linearised):
+            derivatives, gaps = np.zeros((2, len(self.sample))), np.zeros((2, len(self.constraints)))
+            for side, pairs in enumerate(self._linearised):
+                for rows, pair in pairs:
+                    forces, (gaps[side, rows], *_) = pair.derivatives_along(self.problem.displacement(motion))
+                    derivatives[side, : forces.size] += forces.ravel()
+            # Nodal pressures depend on the multipliers alone.
+            derivatives[:, len(motion) : len(motion) + len(self.active)] = gaps[:, self.active]
+            return derivatives[0], derivatives[1]
         increment = self.increment / (largest(motion) or 1.0)
 
         def at(distance: float) -> Array:
@@ -232,10 +258,16 @@ class MovingContact:
 
         return (at(increment) - self.sample) / increment, (self.sample - at(-increment)) / increment
 
-    def _is_consistent(self, derivative: csr_array, dofs: Indices) -> bool:
+    @cached_property
+    def _direction(self) -> Array:
+        """Unknowns (n_dofs,) of a direction in which all points move [-]."""
+        direction, dofs = np.zeros(len(self.u)), self._moving_dofs
+        direction[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
+        return direction
+
+    def _is_consistent(self, derivative: csr_array) -> bool:
         """Return whether the derivative agrees with that along a direction in which all points move."""
-        shift = np.zeros(len(self.u))
-        shift[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
+        shift = self._direction
         forward, backward = self._one_sided(self.problem.system.displacement(shift, np.zeros(len(shift))))
         difference = 0.5 * (forward + backward)
         n, k = len(self.u), len(self.active)
@@ -246,16 +278,11 @@ class MovingContact:
 
 def _independent_groups(dofs: Indices, pattern: csr_array, dim: int) -> list[Indices]:
     """Return groups of components, no two of which affect the same value; `pattern` is `MovingContact._pattern`."""
-    n_points = pattern.shape[1]
-    points = np.unique(dofs[dofs < n_points * dim] // dim)
-    dependent = csr_array(pattern.T @ pattern)
-    colour: dict[int, int] = {}
-    for point in points.tolist():
-        neighbours = dependent.indices[dependent.indptr[point] : dependent.indptr[point + 1]].tolist()
-        used = {colour[other] for other in neighbours if other in colour}
-        colour[point] = next(c for c in range(len(points)) if c not in used)
-    groups: list[Indices] = []
-    for c in range(max(colour.values(), default=-1) + 1):
-        group = np.array([p for p, colour_of_p in colour.items() if colour_of_p == c], np.intp)
-        groups += [np.intersect1d(group * dim + axis, dofs) for axis in range(dim)]
+    n_points, dependent = pattern.shape[1], csr_array(pattern.T @ pattern)
+    colour = np.full(n_points, -1)
+    for point in np.unique(dofs[dofs < n_points * dim] // dim):
+        used = set(colour[dependent.indices[dependent.indptr[point] : dependent.indptr[point + 1]]].tolist())
+        colour[point] = next(c for c in range(n_points) if c not in used)
+    of_colours = [np.flatnonzero(colour == c) * dim for c in range(colour.max(initial=-1) + 1)]
+    groups = [np.intersect1d(first + axis, dofs) for first in of_colours for axis in range(dim)]
     return [group for group in groups if len(group)] + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]

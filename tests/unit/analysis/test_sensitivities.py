@@ -133,20 +133,23 @@ def test_in_space_with_factors_and_with_a_hierarchy(solver):
     compare(make, [("contact_force", "c", "z"), ("pressure_max", "c")], changes, linear_solver=solver)
 
 
-def test_points_that_are_moved_together_give_what_each_gives_alone(monkeypatch):
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+def test_derivatives_of_newtons_method_and_differences_of_each_point_give_the_same(monkeypatch, formulation):
     from fastcontact.analysis.sensitivity import moving_contact
 
-    model = two_blocks()()
+    model, pairings, pair_surfaces = two_blocks("tri6", formulation=formulation)(), [], moving_contact.pair_surfaces
     step = fc.solve(model, 1, criteria=TIGHT)[-1]
+    monkeypatch.setattr(moving_contact, "pair_surfaces", lambda *given: pairings.append(1) or pair_surfaces(*given))
 
     def found():
         return fc.sensitivities(model, step, ("pressure_max", "c"), [("E", 0), ("nu", 1)], ramp=1, criteria=TIGHT)
 
     together = found()
-    monkeypatch.setattr(moving_contact.MovingContact, "_is_consistent", lambda *_: False)
-    alone = found()
-    for parameter, value in alone.derivatives.items():
-        assert together.derivatives[parameter] == pytest.approx(value, rel=1e-9)
+    assert (len(pairings) < 10) == (formulation != "mortar")  # or one pairing for each side of each group of points
+    for name, alone, within in (("_is_consistent", lambda *_: False, 1e-9), ("_linearised", [], 1e-8)):
+        monkeypatch.setattr(moving_contact.MovingContact, name, alone)
+        for parameter, value in found().derivatives.items():
+            assert together.derivatives[parameter] == pytest.approx(value, rel=within)
 
 
 def test_bodies_held_by_contact_alone():
@@ -413,8 +416,9 @@ def test_a_constraint_about_to_change_is_named():
     assert asked(model(low - 1e-3), ("pressure_max", "plane")).margin > 1e-6
 
 
-def test_nodes_between_two_facets_are_named():
-    model = spheres(fc.generate.half_spheres(size=6.0), formulation="mortar")
+@pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
+def test_nodes_between_two_facets_are_named(formulation):
+    model = spheres(fc.generate.half_spheres(size=6.0), formulation=formulation)
     with pytest.raises(fc.ModelError, match=r"lie opposite nodes of the other side|if nodes move"):
         asked(model, ("pressure_max", "hertz"))
 
