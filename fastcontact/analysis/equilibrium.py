@@ -328,19 +328,17 @@ class StepEquilibrium:
 
         For nonlinear bodies the history is that of Newton's method, and the numbers are sums over all Newton iterations.
         """
-        history, scatter = ([], None) if self.settled is None else (self.settled.iterate.history, self.settled.scatter)
-        counts: dict[str, Any] = {
-            "geometry_updates": max(len(history) - 1, 0),
+        pairings, scatter = ([], None) if self.settled is None else (self.settled.iterate.history, self.settled.scatter)
+        history, updates = pairings, max(len(pairings) - 1, 0)
+        if self.terms is not None:
+            history, updates = self.newton, sum(map(itemgetter("pairings"), self.newton))
+        return {
+            "geometry_updates": updates,
             "active_set_iterations": sum(map(itemgetter("active_set_iterations"), history)),
             "linear_iterations": linear_iterations,
             "history": history,
             **({} if scatter is None else {"scatter": scatter}),
         }
-        if self.terms is not None:
-            counts["history"] = self.newton
-            counts["geometry_updates"] = sum(map(itemgetter("pairings"), self.newton))
-            counts["active_set_iterations"] = sum(map(itemgetter("active_set_iterations"), self.newton))
-        return counts
 
 
 def solve_displacements(

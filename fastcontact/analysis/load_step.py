@@ -63,23 +63,24 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ConvergenceError
         If the step does not converge.
     """
-    load = load_without_conduction = problem.load_at(instant)
-    if problem.heat is not None:
-        rise = thermal_coupling.first_rise(problem, problem.heat, state, instant)
-        load = thermal_coupling.thermal_load(problem, load_without_conduction, rise)
+    load, heat = problem.load_at(instant), problem.heat
+    load_without_conduction = load
+    if heat is not None:
+        rise = thermal_coupling.first_rise(problem, heat, state, instant)
+        load = thermal_coupling.thermal_load(problem, load, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     step = prepare_start(problem, state, index, load)
-    temperatures, solution = None, newton_with_wear(step, load)
-    if problem.heat is not None:
-        temperatures, solution = thermal_coupling.settle_heat(
-            problem, step.state, load_without_conduction, instant, rise, solution, partial(newton_with_wear, step)
-        )
+    solution = newton_with_wear(step, load)
+    if heat is not None:
+        arguments = step.state, load_without_conduction, instant, rise, solution, partial(newton_with_wear, step)
+        temperatures, solution = thermal_coupling.settle_heat(problem, heat, *arguments)
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     step = replace(step, state=replace(step.state, wear=solution.wear))
-    final_rise = None if temperatures is None else temperatures.rise
-    end, result = _end_of_step(step, solution, instant, final_rise, iterations)
-    return end, result if temperatures is None else thermal_coupling.with_heat_results(problem, temperatures, result)
+    if heat is None:
+        return _end_of_step(step, solution, instant, None, iterations)
+    end, result = _end_of_step(step, solution, instant, temperatures.rise, iterations)
+    return end, thermal_coupling.with_heat_results(heat, temperatures, result)
 
 
 def _end_of_step(
