@@ -90,7 +90,7 @@ def sensitivities(
 
     The state at the end of the step is recomputed. Its active set is held fixed, and the contact geometry varies with
     the displacements. Derivatives of internal forces with respect to material constants are central differences at the
-    solution; so are those of mortar contact with respect to the displacements at which surfaces are paired.
+    solution; so are those of mortar contact between bodies with respect to the displacements at which they are paired.
 
     Parameters
     ----------

@@ -1,11 +1,10 @@
 """Contact forces and gaps as functions of the configuration of the pairing, and their derivatives.
 
 Contact is paired on the deformed configuration: forces ``B.T multiplier`` and gaps ``gap0 + B u`` also depend on the
-displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). In node-to-segment and
-continuous contact their directional derivatives are those of Newton's method, see `contact.linearised_geometry`. In mortar
-contact, Newton's method neglects the variation of the segments, and the derivatives are finite differences of the pairing
-alone. A point of a surface only affects the constraints around it, so that distant points are moved simultaneously (Curtis,
-Powell and Reid, J. Inst. Math. Appl. 13, 1974).
+displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). Their directional derivatives
+are those of Newton's method, see `contact.linearised_geometry`, where these are complete. Otherwise, as in mortar contact
+between bodies, they are finite differences of the pairing alone. A point of a surface only affects the constraints around
+it, so that distant points are moved simultaneously (Curtis, Powell and Reid, J. Inst. Math. Appl. 13, 1974).
 """
 
 from __future__ import annotations
@@ -24,7 +23,8 @@ from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices, Mask, largest
-from fastcontact.contact.constraints import Linearised, StackedConstraints
+from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.linearised_geometry import LinearisedPoints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import entry_rows
@@ -83,7 +83,13 @@ class MovingContact:
 
     def constraints_at(self, u: Array) -> StackedConstraints:
         """Return the constraints of surfaces paired at displacements u (n_dofs,) [length]."""
-        return pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
+        constraints = pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
+        if len(constraints) != (count := len(self.solution.multiplier)):
+            raise ModelError(
+                f"contact has {count} constraints, but {len(constraints)} if nodes move: nodes of both sides coincide, and "
+                f"the one-sided derivatives differ there. {OPPOSITE_NODES}"
+            )
+        return constraints
 
     def sample_at(self, u: Array) -> Array:
         """Return forces, gaps and pressures for surfaces paired at u (n_dofs,), at the displacements `self.u` [length].
@@ -92,11 +98,6 @@ class MovingContact:
         their compliance [length], then the nodal pressures (n_nodes,) of the pair if they are requested.
         """
         constraints, multiplier = self.constraints_at(u), self.solution.multiplier
-        if len(constraints) != len(multiplier):
-            raise ModelError(
-                f"contact has {len(multiplier)} constraints, but {len(constraints)} if nodes move: nodes of both sides "
-                f"coincide, and the one-sided derivatives differ there. {OPPOSITE_NODES}"
-            )
         gap = constraints.gap0 + constraints.B @ self.u
         if constraints.normal_compliance is not None:
             gap = gap + constraints.normal_compliance.apply(multiplier)
@@ -224,29 +225,42 @@ class MovingContact:
         return self.sample_at(self.u)
 
     @cached_property
-    def _linearised(self) -> list[list[tuple[slice, Linearised]]]:
-        """Linearised pairs on either side of the configuration, whose derivatives differ at kinks; empty without them.
+    def _linearised(self) -> list[dict[str, LinearisedPoints]]:
+        """Linearised pairs on either side of the configuration, whose derivatives differ at kinks.
 
-        In mortar contact, for force-driven obstacles and for active constraints without force, the derivatives in Newton's
-        method are approximate or incomplete.
+        The result is empty if the derivatives in Newton's method are incomplete: they omit constraints without force, the
+        variation of the segments in mortar contact between bodies, and that of overhangs.
         """
-        problem, u, is_complete = self.problem, self.u, self.solution.multiplier[self.active].all()
-        if not is_complete or problem.force_driven.pairs or any(p.name == "mortar" for p in problem.pairs.values()):
-            return []
+        problem, u, sides = self.problem, self.u, list[dict[str, LinearisedPoints]]()
+        pairs = problem.pairs.values()
+        has_segments = any(pair.name == "mortar" and isinstance(pair.primary, Surface) for pair in pairs)
+        if has_segments or not self.solution.multiplier[self.active].all():
+            return sides
         shift = self.increment * problem.system.displacement(self._direction, np.zeros(len(u)))
-        paired = (self.constraints_at(u + side * shift) for side in (1.0, -1.0))
-        return [linearised_pairs(constraints, self.solution, problem.displacement(u)) for constraints in paired]
+        for side in (1.0, -1.0):
+            found = linearised_pairs(self.constraints_at(u + side * shift), self.solution, problem.displacement(u))
+            exact = {name: p for name, p in found.items() if isinstance(p, LinearisedPoints) and not p.points.overhangs}
+            if not exact or len(exact) < len(found):
+                return []
+            sides.append(exact)
+        return sides
 
     def _one_sided(self, motion: Array) -> tuple[Array, Array]:
         """Return the forward and the backward derivative of `sample_at` along a motion (n_dofs,) of the points."""
-        if any(self._linearised):
+        problem, n = self.problem, len(motion)
+        if self._linearised:
             derivatives, gaps = np.zeros((2, len(self.sample))), np.zeros((2, len(self.constraints)))
             for side, pairs in enumerate(self._linearised):
-                for rows, pair in pairs:
-                    forces, (gaps[side, rows], *_) = pair.derivatives_along(self.problem.displacement(motion))
+                for name, pair in pairs.items():
+                    nodal_motion, driven = problem.displacement(motion), problem.force_driven.number(name)
+                    if driven is not None:  # only the motion relative to the obstacle counts
+                        nodal_motion = nodal_motion - motion[problem.force_driven.dofs(driven)]
+                    forces, (gaps[side, self.constraints.rows[name]], *_) = pair.derivatives_along(nodal_motion)
                     derivatives[side, : forces.size] += forces.ravel()
+                    if driven is not None:
+                        derivatives[side, problem.force_driven.dofs(driven)] -= forces.sum(axis=0)
             # Nodal pressures depend on the multipliers alone.
-            derivatives[:, len(motion) : len(motion) + len(self.active)] = gaps[:, self.active]
+            derivatives[:, n : n + len(self.active)] = gaps[:, self.active]
             return derivatives[0], derivatives[1]
         increment = self.increment / (largest(motion) or 1.0)
 
