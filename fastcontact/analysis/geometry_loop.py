@@ -346,7 +346,7 @@ def newton_step(
     displacement = step.problem.displacement(u)
     if nodes is not None:
         solution = nodes.with_distributed_forces(solution, constraints, u)
-    if solution.response is None or not (geometries := _linearised(constraints, solution, displacement)):
+    if solution.response is None or not (geometries := linearised_pairs(constraints, solution, displacement)):
         return None
     try:
         respond = solution.response()
@@ -359,9 +359,9 @@ def newton_step(
     def response_along(v: Array) -> Array:
         """Return the active components (k,) of ``S'(u) v`` for changes v of the components on which contact depends."""
         motion[step.problem.contact_dofs], force[:] = v, 0.0
-        for rows, geometry in geometries:
+        for name, geometry in geometries.items():
             forces, slips = geometry.derivatives_along(nodal_motion)
-            gaps[: len(slips), rows] = slips
+            gaps[: len(slips), constraints.rows[name]] = slips
             force[: forces.size] += forces.ravel()
         merged = gaps if nodes is None else nodes.merged_gaps(gaps)
         return np.asarray(dofs.T @ respond(dofs.transpose @ force[dofs.active], merged))
@@ -383,17 +383,15 @@ def newton_step(
     return next_pairing, response_size / (largest_change * largest(v) or 1.0)
 
 
-def _linearised(
-    constraints: StackedConstraints, solution: Solution, displacement: Array
-) -> list[tuple[slice, Linearised]]:
-    """Return the rows and the linearised geometry of each pair in contact; empty if one of them has no derivatives."""
-    geometries = []
+def linearised_pairs(constraints: StackedConstraints, solution: Solution, displacement: Array) -> dict[str, Linearised]:
+    """Return the linearised geometry of each pair in contact, by name; empty if one of them has no derivatives."""
+    geometries = dict[str, Linearised]()
     for name, rows in constraints.rows.items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
         if (part.tied is not None and part.geometry is None) or not multiplier.any():
             continue
         if part.geometry is None:
-            return []
+            return {}
         tangential = solution.tangential[rows, : len(part.tangents)]
-        geometries.append((rows, part.geometry(multiplier, tangential, displacement)))
+        geometries[name] = part.geometry(multiplier, tangential, displacement)
     return geometries

@@ -89,8 +89,8 @@ def sensitivities(
     """Return the derivatives of a quantity with respect to parameters of the model, by one adjoint solution.
 
     The state at the end of the step is recomputed. Its active set is held fixed, and the contact geometry varies with
-    the displacements. Derivatives of internal forces with respect to material constants, and of the pairing with
-    respect to displacements, are central differences at the solution.
+    the displacements. Derivatives of internal forces with respect to material constants are central differences at the
+    solution; so are those of mortar contact between bodies with respect to the displacements at which they are paired.
 
     Parameters
     ----------

@@ -135,6 +135,9 @@ class SurfacePoints:
         Normals of the primary side at the feet [-].
     averaged : InterpolatedNormals or None
         Averaged normals; None with other normals.
+    overhangs : bool
+        Whether points lie beyond the end of the primary side. Their normals are those at the end, but the variation of the
+        normals is that of the extended facets.
     """
 
     def __init__(
@@ -144,6 +147,7 @@ class SurfacePoints:
         feet, coordinates, facet = pairing.extended_feet(rows), primary.coordinates, pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
         self.motion = shapes_at(shape, nodes, len(coordinates))
+        self.overhangs = pairing.beyond is not None and bool(pairing.beyond[rows].any())
         self._feet, ascending = feet, np.argsort(feet.nodes, axis=1)
         self._foot_nodes = np.take_along_axis(feet.nodes, ascending, axis=1)
         self._weight_gradient = -np.take_along_axis(feet.gradient, ascending[:, :, None], axis=1)
@@ -253,7 +257,7 @@ class ObstaclePoints:
     """
 
     def __init__(self, secondary: csr_array, obstacle: RigidSide, coordinates: Array, pose: Pose) -> None:
-        self.averaged = None
+        self.averaged, self.overhangs = None, False
         self.motion, x = secondary, secondary @ coordinates
         gap, self.normal, paired, _ = obstacle.project(x, pose)
         self._gap = np.where(paired, gap, 0.0)[:, None]

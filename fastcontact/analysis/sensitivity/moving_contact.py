@@ -1,10 +1,10 @@
 """Contact forces and gaps as functions of the configuration of the pairing, and their derivatives.
 
 Contact is paired on the deformed configuration: forces ``B.T multiplier`` and gaps ``gap0 + B u`` also depend on the
-displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). These derivatives are taken by
-finite differences of the pairing alone, which is cheap and smooth; no load step is solved again. A point of a surface only
-affects the constraints around it, so that distant points are moved simultaneously (Curtis, Powell and Reid, J. Inst. Math.
-Appl. 13, 1974).
+displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). Their directional derivatives
+are those of Newton's method, see `contact.linearised_geometry`, where these are complete. Otherwise, as in mortar contact
+between bodies, they are finite differences of the pairing alone. A point of a surface only affects the constraints around
+it, so that distant points are moved simultaneously (Curtis, Powell and Reid, J. Inst. Math. Appl. 13, 1974).
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ from scipy.sparse import csr_array, eye_array, hstack, kron, vstack
 
 from fastcontact._tools.records import record, replace
 from fastcontact.analysis.contact_result import closed_node_pressures
+from fastcontact.analysis.geometry_loop import linearised_pairs
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.linearised_geometry import LinearisedPoints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import entry_rows
@@ -81,7 +83,13 @@ class MovingContact:
 
     def constraints_at(self, u: Array) -> StackedConstraints:
         """Return the constraints of surfaces paired at displacements u (n_dofs,) [length]."""
-        return pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
+        constraints = pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
+        if len(constraints) != (count := len(self.solution.multiplier)):
+            raise ModelError(
+                f"contact has {count} constraints, but {len(constraints)} if nodes move: nodes of both sides coincide, and "
+                f"the one-sided derivatives differ there. {OPPOSITE_NODES}"
+            )
+        return constraints
 
     def sample_at(self, u: Array) -> Array:
         """Return forces, gaps and pressures for surfaces paired at u (n_dofs,), at the displacements `self.u` [length].
@@ -90,11 +98,6 @@ class MovingContact:
         their compliance [length], then the nodal pressures (n_nodes,) of the pair if they are requested.
         """
         constraints, multiplier = self.constraints_at(u), self.solution.multiplier
-        if len(constraints) != len(multiplier):
-            raise ModelError(
-                f"contact has {len(multiplier)} constraints, but {len(constraints)} if nodes move: nodes of both sides "
-                f"coincide, and the one-sided derivatives differ there. {OPPOSITE_NODES}"
-            )
         gap = constraints.gap0 + constraints.B @ self.u + constraints.elastic_gaps(multiplier)
         pressure = self.pressure(multiplier, constraints)
         return np.concatenate([constraints.force(multiplier), gap[self.active], pressure])
@@ -139,9 +142,9 @@ class MovingContact:
             nodes = len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0
             shape = len(self.u) + len(self.active) + nodes, len(self.u) + len(lifts)
             return csr_array(shape), csr_array(shape)
-        dofs = self._moving_dofs()
+        dofs = self._moving_dofs
         derivatives = self._differences(_independent_groups(dofs, self._pattern, self.problem.model.mesh.dim))
-        if not self._is_consistent(0.5 * (derivatives[0] + derivatives[1]), dofs):
+        if not self._is_consistent(0.5 * (derivatives[0] + derivatives[1])):
             derivatives = self._differences([np.array([dof]) for dof in dofs])
         along_lifts = [self._one_sided(lift / (largest(lift) or 1.0)) for lift in lifts]
         columns = [[csr_array(pair[side][:, None]) for pair in along_lifts] for side in (0, 1)]
@@ -160,8 +163,9 @@ class MovingContact:
         jump.eliminate_zeros()
         return jump
 
+    @cached_property
     def _moving_dofs(self) -> Indices:
-        """Return the unknowns that active constraints may depend on."""
+        """Unknowns that active constraints may depend on."""
         dim, contact_dofs = self.problem.model.mesh.dim, self.problem.contact_dofs
         points = np.unique(self._pattern.nonzero()[1])
         obstacle_dofs = contact_dofs[contact_dofs >= self.problem.model.n_dofs]
@@ -218,8 +222,44 @@ class MovingContact:
         """Forces, gaps and pressures at the displacements of the step, see `sample_at`."""
         return self.sample_at(self.u)
 
+    @cached_property
+    def _linearised(self) -> list[dict[str, LinearisedPoints]]:
+        """Linearised pairs on either side of the configuration, whose derivatives differ at kinks.
+
+        The result is empty if the derivatives in Newton's method are incomplete: they omit constraints without force, the
+        variation of the segments in mortar contact between bodies, and that of overhangs.
+        """
+        problem, u, sides = self.problem, self.u, list[dict[str, LinearisedPoints]]()
+        pairs = problem.pairs.values()
+        has_segments = any(pair.name == "mortar" and isinstance(pair.primary, Surface) for pair in pairs)
+        if has_segments or not self.solution.multiplier[self.active].all():
+            return sides
+        shift = self.increment * problem.system.displacement(self._direction, np.zeros(len(u)))
+        for side in (1.0, -1.0):
+            found = linearised_pairs(self.constraints_at(u + side * shift), self.solution, problem.displacement(u))
+            exact = {name: p for name, p in found.items() if isinstance(p, LinearisedPoints) and not p.points.overhangs}
+            if not exact or len(exact) < len(found):
+                return []
+            sides.append(exact)
+        return sides
+
     def _one_sided(self, motion: Array) -> tuple[Array, Array]:
         """Return the forward and the backward derivative of `sample_at` along a motion (n_dofs,) of the points."""
+        problem, n = self.problem, len(motion)
+        if self._linearised:
+            derivatives, gaps = np.zeros((2, len(self.sample))), np.zeros((2, len(self.constraints)))
+            for side, pairs in enumerate(self._linearised):
+                for name, pair in pairs.items():
+                    nodal_motion, driven = problem.displacement(motion), problem.force_driven.number(name)
+                    if driven is not None:  # only the motion relative to the obstacle counts
+                        nodal_motion = nodal_motion - motion[problem.force_driven.dofs(driven)]
+                    forces, (gaps[side, self.constraints.rows[name]], *_) = pair.derivatives_along(nodal_motion)
+                    derivatives[side, : forces.size] += forces.ravel()
+                    if driven is not None:
+                        derivatives[side, problem.force_driven.dofs(driven)] -= forces.sum(axis=0)
+            # Nodal pressures depend on the multipliers alone.
+            derivatives[:, n : n + len(self.active)] = gaps[:, self.active]
+            return derivatives[0], derivatives[1]
         increment = self.increment / (largest(motion) or 1.0)
 
         def at(distance: float) -> Array:
@@ -230,10 +270,16 @@ class MovingContact:
 
         return (at(increment) - self.sample) / increment, (self.sample - at(-increment)) / increment
 
-    def _is_consistent(self, derivative: csr_array, dofs: Indices) -> bool:
+    @cached_property
+    def _direction(self) -> Array:
+        """Unknowns (n_dofs,) of a direction in which all points move [-]."""
+        direction, dofs = np.zeros(len(self.u)), self._moving_dofs
+        direction[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
+        return direction
+
+    def _is_consistent(self, derivative: csr_array) -> bool:
         """Return whether the derivative agrees with that along a direction in which all points move."""
-        shift = np.zeros(len(self.u))
-        shift[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
+        shift = self._direction
         forward, backward = self._one_sided(self.problem.system.displacement(shift, np.zeros(len(shift))))
         difference = 0.5 * (forward + backward)
         n, k = len(self.u), len(self.active)
@@ -244,16 +290,11 @@ class MovingContact:
 
 def _independent_groups(dofs: Indices, pattern: csr_array, dim: int) -> list[Indices]:
     """Return groups of components, no two of which affect the same value; `pattern` is `MovingContact._pattern`."""
-    n_points = pattern.shape[1]
-    points = np.unique(dofs[dofs < n_points * dim] // dim)
-    dependent = csr_array(pattern.T @ pattern)
-    colour: dict[int, int] = {}
-    for point in points.tolist():
-        neighbours = dependent.indices[dependent.indptr[point] : dependent.indptr[point + 1]].tolist()
-        used = {colour[other] for other in neighbours if other in colour}
-        colour[point] = next(c for c in range(len(points)) if c not in used)
-    groups: list[Indices] = []
-    for c in range(max(colour.values(), default=-1) + 1):
-        group = np.array([p for p, colour_of_p in colour.items() if colour_of_p == c], np.intp)
-        groups += [np.intersect1d(group * dim + axis, dofs) for axis in range(dim)]
+    n_points, dependent = pattern.shape[1], csr_array(pattern.T @ pattern)
+    colour = np.full(n_points, -1)
+    for point in np.unique(dofs[dofs < n_points * dim] // dim):
+        used = set(colour[dependent.indices[dependent.indptr[point] : dependent.indptr[point + 1]]].tolist())
+        colour[point] = next(c for c in range(n_points) if c not in used)
+    of_colours = [np.flatnonzero(colour == c) * dim for c in range(colour.max(initial=-1) + 1)]
+    groups = [np.intersect1d(first + axis, dofs) for first in of_colours for axis in range(dim)]
     return [group for group in groups if len(group)] + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]

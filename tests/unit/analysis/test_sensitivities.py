@@ -116,15 +116,19 @@ def test_axisymmetric_spheres():
     compare(make, [("reaction", "A2B2", "y"), ("pressure_max", "hertz")], changes)
 
 
-@pytest.mark.parametrize("solver", [pytest.param("direct", marks=pytest.mark.slow), "amg"])
-def test_in_space_with_factors_and_with_a_hierarchy(solver):
+SOLVERS = [pytest.param("direct", 0.72, "mortar", marks=pytest.mark.slow), ("amg", 0.72, "mortar")]
+
+
+@pytest.mark.parametrize(("solver", "y", "formulation"), [*SOLVERS, ("auto", 2.0, "continuous")])  # the last overhangs
+def test_in_space_with_factors_and_with_a_hierarchy(solver, y, formulation):
     lower = fc.generate.box((4.0, 4.0, 2.0), (4, 4, 1))
-    mesh = united(L=lower, U=fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1), "hex8", (0.83, 0.72, 2.0)))
+    mesh = united(L=lower, U=fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1), "hex8", (0.83, y, 2.0)))
 
     def make(E=1000.0, nu=0.3, moved=1.0, clearance=0.0):
         model = made_of(mesh, "3d", {"LBOX": fc.LinearElastic(E=E, nu=nu), "UBOX": fc.LinearElastic(E=2500.0, nu=0.22)})
         supported(model, LZMIN="xyz", UZMAX={"x": 0.01, "y": 0.004, "z": -0.05 * moved})
-        model.add_contact("c", secondary="UZMIN", primary="LZMAX", clearance=clearance)
+        sides = {"secondary": "UZMIN", "primary": "LZMAX"}
+        model.add_contact("c", **sides, clearance=clearance, formulation=formulation)
         return model
 
     changes = {"nu": STEEL["nu"], "moved": (("prescribed", "UZMAX", "z"), 1.0, 1e-4)}
@@ -133,20 +137,23 @@ def test_in_space_with_factors_and_with_a_hierarchy(solver):
     compare(make, [("contact_force", "c", "z"), ("pressure_max", "c")], changes, linear_solver=solver)
 
 
-def test_points_that_are_moved_together_give_what_each_gives_alone(monkeypatch):
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+def test_derivatives_of_newtons_method_and_differences_of_each_point_give_the_same(monkeypatch, formulation):
     from fastcontact.analysis.sensitivity import moving_contact
 
-    model = two_blocks()()
+    model, pairings, pair_surfaces = two_blocks("tri6", formulation=formulation)(), [], moving_contact.pair_surfaces
     step = fc.solve(model, 1, criteria=TIGHT)[-1]
+    monkeypatch.setattr(moving_contact, "pair_surfaces", lambda *given: pairings.append(1) or pair_surfaces(*given))
 
     def found():
         return fc.sensitivities(model, step, ("pressure_max", "c"), [("E", 0), ("nu", 1)], ramp=1, criteria=TIGHT)
 
     together = found()
-    monkeypatch.setattr(moving_contact.MovingContact, "_is_consistent", lambda *_: False)
-    alone = found()
-    for parameter, value in alone.derivatives.items():
-        assert together.derivatives[parameter] == pytest.approx(value, rel=1e-9)
+    assert (len(pairings) < 10) == (formulation != "mortar")  # or one pairing for each side of each group of points
+    for name, alone, within in (("_is_consistent", lambda *_: False, 1e-9), ("_linearised", [], 1e-8)):
+        monkeypatch.setattr(moving_contact.MovingContact, name, alone)
+        for parameter, value in found().derivatives.items():
+            assert together.derivatives[parameter] == pytest.approx(value, rel=within)
 
 
 def test_bodies_held_by_contact_alone():
@@ -175,7 +182,7 @@ def test_pairing_that_is_kept_takes_one_solution():
 
 @pytest.mark.filterwarnings("ignore:contact 'ball'. facets of 'TOP' and of the other side deviate")
 @pytest.mark.each_value
-@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
 def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     dim = 3 if kinematics == "3d" else 2
@@ -414,9 +421,14 @@ def test_a_constraint_about_to_change_is_named():
 
 
 def test_nodes_between_two_facets_are_named():
-    model = spheres(fc.generate.half_spheres(size=6.0), formulation="mortar")
-    with pytest.raises(fc.ModelError, match=r"lie opposite nodes of the other side|if nodes move"):
-        asked(model, ("pressure_max", "hertz"))
+    rings = fc.generate.rings("quad8", divisions_inner=(3, 8), divisions_outer=(4, 11))
+    pressed = elastic_model(rings, "plane_strain", SYMMETRY_X="x", SYMMETRY_Y="y")
+    pressed.add_pressure("BORE", 20.0)
+    sides = {"secondary": "CONT_OUTER", "primary": "CONT_INNER"}
+    pressed.add_contact("hertz", **sides, clearance=-0.02, formulation="node_to_segment", normals="averaged")
+    for model in (pressed, spheres(fc.generate.half_spheres(size=6.0), formulation="mortar")):
+        with pytest.raises(fc.ModelError, match=r"lie opposite nodes of the other side|if nodes move"):
+            asked(model, ("pressure_max", "hertz"))
 
 
 def test_the_value_of_a_result_file_is_enough(tmp_path):
