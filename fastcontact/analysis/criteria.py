@@ -17,8 +17,11 @@ NOTABLE = 1e-2
 # - strains, because the fraction of a strain that linear kinematics neglect is about as large as the strain;
 # - the wear depth, relative to the size of the model;
 # - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield;
-# - the length of the facets of one side, relative to that of the other side.
+# - the length of the facets of one side, relative to that of the other side;
+# - the elastic energy of a body whose stress is examined alone, relative to that of all bodies.
 WARNING_RATIO = 0.1
+# Estimated relative error of pressures, or of the stiffness of nearly incompressible cells, above which a warning is given.
+WARNING_ERROR = 0.05
 # Largest number of times that the step of an iteration is halved: the iterations for displacements, for positions of floating
 # bodies, and for friction forces.
 HALVINGS = 6
