@@ -36,7 +36,8 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Smallest number of pairings after which edges of facets are rounded, because pairings are assumed to alternate.
+# Smallest number of pairings after which edges of facets are rounded, because pairings are assumed to alternate. It matters
+# if `max_geometry_updates` is less than twice as large; without rounding, `test_equilibrium_is_found_in_space` fails.
 UPDATES_BEFORE_ROUNDING = 25
 # Safety factor for the contraction of changes by the next solution, which is estimated from the last Newton step.
 SAFETY = 3.0

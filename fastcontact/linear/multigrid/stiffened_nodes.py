@@ -22,7 +22,8 @@ from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.round_off import SINGLE_PRECISION
 
 # An unknown of the other side follows the pivots of its equations only if a unit translation of that side displaces these
-# pivots by at least this amount on average.
+# pivots by at least this amount on average. With 1, "modulus ratio 0.0001" with friction takes 98 iterations instead of 54
+# (robustness table, 3 000 unknowns); `test_unknowns_that_move_no_pivot_by_themselves_do_not_follow`.
 SMALLEST_MOTION = 0.3
 
 
