@@ -27,8 +27,9 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors, weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Cosine of the angle between the outward normals of both sides beyond which primary facets face away from the secondary side,
-# such as the back of a plate. Flanks of a curved body, whose normals are perpendicular, are wetted.
+# Cosine of the angle between the outward normals of both sides beyond which primary facets face away from the secondary
+# side, such as the back of a plate. Flanks of a curved body, whose normals are perpendicular, are wetted. Without it,
+# `test_the_force_of_a_fluid_does_not_depend_on_the_choice_of_the_secondary_side` fails.
 FACING_AWAY = 0.5
 # Gap, as a fraction of the size of the secondary side, and deviation of the cosine between opposite normals from 1, up to
 # which the force on the secondary side acts on the primary side. Forces at a front then balance exactly. The fraction that

@@ -146,7 +146,7 @@ def _overlapping_pairs(secondary: _Polygons, primary: _Polygons, reach: Array) -
 
     `reach` (n_secondary,) are the largest distances at which facets are paired [length].
     """
-    numbers = tree_order(primary.origin, 1)
+    numbers = tree_order(primary.origin)
     corners = primary.nodes[numbers, : primary.n_corners]
     tree = build(corners.min(axis=1), corners.max(axis=1))
     capacity = 8 * (len(secondary.nodes) + len(primary.nodes))

@@ -30,7 +30,7 @@ def facing(secondary, primary, room=1000, reach=2.0):
     """Pairs of polygons (n, n_corners, 3) that face each other."""
     (origin, axes), (_, other_axes) = planes(secondary), planes(primary)
     radius = np.linalg.norm(secondary - origin[:, None], axis=2).max(axis=1)
-    numbers = tree_order(primary[:, 0].copy(), 1)
+    numbers = tree_order(primary[:, 0].copy())
     tree = build(primary.min(axis=1)[numbers], primary.max(axis=1)[numbers])
     pairs = np.empty((room, 2), np.intp)
     count = _cut_faces_kernels.facing_pairs(
