@@ -37,7 +37,8 @@ SMALLEST_PIVOT = 0.25
 # cannot be factorised (`test_many_coupled_equations_are_assigned_unknowns`). The latter is also the largest number of
 # equations whose pivots are chosen by a dense QR factorisation.
 LARGEST_BLOCK, LARGEST_DENSE = 64, 500
-# Largest number of layers of equations. The inverse is a sum with one product of sparse matrices for each layer.
+# Largest number of layers of equations. The inverse is a sum with one product of sparse matrices for each layer. With one,
+# `test_nodes_in_layers_have_a_sparse_inverse` fails.
 MAX_LAYERS = 4
 
 
