@@ -21,19 +21,18 @@ NOTABLE = 1e-2
 # - the elastic energy of a body whose stress is examined alone, relative to that of all bodies.
 WARNING_RATIO = 0.1
 # Estimated relative error of pressures, or of the stiffness of nearly incompressible cells, above which a warning is given.
-# Other values fail `test_errors_of_chords_against_exact_shapes_are_told_from_one_twentieth_on`.
+# With 0.15 against rigid shapes, `test_errors_of_chords_against_exact_shapes_are_told_from_one_twentieth_on` fails.
 WARNING_ERROR = 0.05
 # Largest number of times that the step of an iteration is halved: the iterations for displacements, for positions of
-# floating bodies, and for friction forces. Without halving, finite strain does not converge in
-# `test_a_force_takes_the_way_of_the_displacement`.
+# floating bodies, and for friction forces. Without halving, `test_a_force_takes_the_way_of_the_displacement` fails.
 HALVINGS = 6
 # Steps are halved until they reduce a norm by this fraction of the expected reduction (Nocedal and Wright, 2006, equation
 # 3.4). With zero, `test_newton_steps_that_overshoot_are_halved` fails.
 DECREASE = 1e-4
 # Estimated relative error of a linear solution, relative to its residual.
 LINEAR_ERROR = 10.0
-# Largest number of Newton iterations: of a load step, for a friction law, and of the positions of floating bodies.
-# Converging steps take up to 13, see `newton.GAP_STIFFNESS`.
+# Largest number of Newton iterations: of a load step, for a friction law, and of the positions of floating bodies. An O-ring
+# under fluid pressure takes 13, see `newton.GAP_STIFFNESS`.
 MAX_NEWTON_ITERATIONS = 40
 
 

@@ -40,11 +40,9 @@ from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Factor by which load steps are too large for the wear of single facets, above which the coefficient of wear may be wrong.
-# `test_warnings.py`, "a coefficient of wear in another unit".
 LARGEST_STEP_FACTOR = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `pressure_oscillation`. On other
-# facets the limit is ALTERNATING. There, it is at most 0.07 where pressures are resolved, and at least 0.15 where they are
-# wrong by 0.14 or more.
+# facets the limit is ALTERNATING.
 ALTERNATING_ON_LINES = 0.13
 # Smallest number of elements across the radius of a contact that resolves its pressure.
 MIN_FACETS_ACROSS_RADIUS = 4

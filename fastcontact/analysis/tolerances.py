@@ -30,8 +30,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 # it in a step that is extrapolated from earlier ones. With 0.3, "nu 0.499" takes 12 pairings instead of 6, and with 0.003
 # 146 iterations instead of 109 (robustness table, 3 000 unknowns).
 RESIDUAL = 0.03
-# Number of geometry updates, or of Newton iterations, within which changes must decrease. With 3, converging updates count
-# as scatter; with 40, `test_noise_is_found_soon_and_measured` fails.
+# Number of geometry updates, or of Newton iterations, within which changes must decrease. With 40,
+# `test_noise_is_found_soon_and_measured` fails, and with 3, `test_a_side_cut_in_several_is_what_it_is_whole`.
 WINDOW = 8
 # Changes or distances below this fraction of earlier ones are regarded as decreasing. An iteration is regarded as converging
 # if the changes in the second half of the window are below this fraction of those in the first half. If the residual of the

@@ -26,7 +26,7 @@ log = logging.getLogger("fastcontact")
 MAX_LAST_UNKNOWNS = 4000
 # Largest number of unknowns for which a factorisation is affordable, by dimension.
 MAX_FACTORISED_DOFS = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
-# Relative residual that direct solutions attain. LINEAR_ERROR times it must be less than ROUND_OFF.
+# Relative residual that direct solutions attain.
 ATTAINABLE_RESIDUAL = ROUND_OFF / 100
 # Number of right-hand sides that are stored. Loads and supports seldom have more independent ramps.
 # `test_only_a_few_loads_are_kept`.

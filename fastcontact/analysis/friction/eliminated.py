@@ -39,7 +39,7 @@ STIFFEST = 100.0
 STIFFNESS_ESTIMATE = 0.2
 # Tolerance of the residual of the friction law relative to the tolerance of the linear solutions, and the larger tolerance
 # that is accepted where it cannot be reached. If contact forces are a small fraction of all forces, they cannot be more
-# accurate. Both are needed in `test_stacks_with_friction.py`.
+# accurate. Without ACCEPTABLE, `test_forces_that_cannot_be_more_accurate_settle_without_a_compliance` needs columns of K^-1.
 LAW_TOLERANCE, ACCEPTABLE = 10.0, 300.0
 
 

@@ -37,8 +37,8 @@ SAFETY_FACTOR = 1.08
 # with 1/240.
 SMOOTHED_FRACTION = 1 / 24
 DEGREE = 3
-# Largest number of unknowns of a level that is not coarsened further and whose inverse is computed. With 20, the iterations
-# are the same, but small levels cost more calls of kernels than a product with the inverse.
+# Largest number of unknowns of a level that is not coarsened further and whose inverse is computed. With 20, iterations in
+# the same table differ by at most two.
 COARSEST_SIZE = 200
 
 
