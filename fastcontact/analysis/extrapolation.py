@@ -13,9 +13,11 @@ from fastcontact.arrays import Array, Mask, largest
 
 # Gaps (m,) [length] and multipliers (m,) [force] of a pair.
 GapsAndForces = tuple[Array, Array]
-# Largest ratio of the current load increment to the last one at which steps are extrapolated.
+# Largest ratio of the current load increment to the last one at which steps are extrapolated. Substeps grow by this factor
+# at most (`step_halving`); `test_displacements_go_on_with_the_loads_but_not_far_and_not_back`.
 MAX_RATIO = 2.0
-# Highest degree of the extrapolation polynomial.
+# Highest degree of the extrapolation polynomial. Each degree stores the displacements of one more step;
+# `test_a_smooth_path_is_continued_by_polynomials_of_ascending_degree`.
 MAX_DEGREE = 4
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import NOTABLE, WARNING_ERROR
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
@@ -27,9 +27,8 @@ from fastcontact.round_off import TINY
 
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
 # pressures were 0.2 to 3.2 times the estimate on linear facets, except where contact opens due to the error, and up to 3
-# times on quadratic ones. Against rigid shapes the ratio is 0.9 to 1.3, and the limit is smaller.
+# times on quadratic ones. Against rigid shapes the ratio is 0.9 to 1.3, and the limit is WARNING_ERROR.
 RELATIVE_ERROR_LIMIT = {1: 0.2, 2: 0.1}
-RELATIVE_ERROR_LIMIT_AT_RIGID_SHAPES = 0.05
 # Ratio of the estimate to E d / L if the gaps are weighted means: the inverse mass matrix amplifies gaps that alternate from
 # node to node.
 MEAN_GAP_FACTOR = 2.0
@@ -55,7 +54,7 @@ def _warning(pair: Formulation, spread: float, slope: float, contact: ContactRes
     limit, power = RELATIVE_ERROR_LIMIT[order], 2 * order - 1
     remedy = "surface_smoothing=True measures the gap between the arcs"
     if isinstance(pair.primary, RigidSide):
-        limit, power = RELATIVE_ERROR_LIMIT_AT_RIGID_SHAPES, 2 * order
+        limit, power = WARNING_ERROR, 2 * order
         remedy = "formulation 'node_to_segment' measures the gap at nodes, which lie on the arc"
     mean = float(contact.pressure[contact.pressure > 0.0].mean())
     error = pair.modulus * slope

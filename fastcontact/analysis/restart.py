@@ -25,6 +25,7 @@ from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import ROUND_OFF
 
+# Version of the restart data; those of other versions are rejected.
 FORMAT = 1
 # Criteria on which the solution depends; the others are limits and tolerances.
 SOLUTION_CRITERIA = ("geometry_updates", "keep_pairing")

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import dijkstra
 
 from fastcontact._tools.records import replace
-from fastcontact.analysis.criteria import NOTABLE, WARNING_RATIO, Criteria
+from fastcontact.analysis.criteria import NOTABLE, WARNING_ERROR, WARNING_RATIO, Criteria
 from fastcontact.analysis.facet_sag import facet_length, sag_warning
 from fastcontact.analysis.interpenetration import Peak, interpenetration
 from fastcontact.analysis.kinematics_warnings import large_rotation, large_strain
@@ -46,14 +46,10 @@ LARGEST_STEP_FACTOR = 1000
 ALTERNATING_ON_LINES = 0.13
 # Smallest number of elements across the radius of a contact that resolves its pressure.
 MIN_FACETS_ACROSS_RADIUS = 4
-# Relative residual of the displacement or of the forces above which a warning is given.
-NOTABLE_RESIDUAL = 1e-4
 # Sliding past periodic ends, relative to the length of facets, above which a warning is given. On a strip with friction 0.3
 # under a uniform pressure, the relative changes of pressures at the ends are 0.03 times this ratio with dual multipliers and
 # 0.7 times with standard multipliers. In press fits they are 1.7 times this ratio with standard multipliers.
 SLIDE_PAST_ENDS, SLIDE_PAST_ENDS_DUAL = 0.01, 0.3
-# Estimated pressure error due to integration over complete facets, over the mean pressure, above which a warning is given.
-QUADRATURE_ERROR = 0.05
 # Alternation of shear above which a warning is given. It is 0.42 to 1.0 in continuous contact with quadratic facets where a
 # contact that sticks grows, and at most 0.1 with mortar.
 SHEAR_ALTERNATING = 0.4
@@ -289,7 +285,7 @@ def _loose_criteria(problem: Problem, last: StepResult) -> Iterator[str]:
     if not history:
         return
     change, residual = history[-1]["displacement_change"], history[-1]["residual"]
-    if problem.until_settled and change > NOTABLE_RESIDUAL:
+    if problem.until_settled and change > NOTABLE**2:
         yield (
             f"the contact geometry counts as converged although the displacement still changed by {change:.1e} of its "
             f"largest component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
@@ -307,7 +303,7 @@ def _loose_criteria(problem: Problem, last: StepResult) -> Iterator[str]:
             f"round-off makes contact forces scatter by {scatter['force']:.1e} of the largest one from update to update, and "
             f"displacements by {scatter['displacement']:.1e}: results are no more accurate than that"
         )
-    if residual > min(NOTABLE_RESIDUAL, criteria.relative):
+    if residual > min(NOTABLE**2, criteria.relative):
         cause = "by round-off of a stiff body that moves far, for which a rigid obstacle may be substituted; "
         yield (
             f"forces are out of balance by {residual:.1e} of the largest force (Criteria.relative = {criteria.relative:g}): "
@@ -487,7 +483,7 @@ def _quadrature_error(
         return
     modulus, other = (_modulus(model, side.points) for side in (pair.secondary, pair.primary))
     error = modulus / (modulus + other) * float(np.abs(pair.quadrature_error(configuration, contact.pressure)).max())
-    if error > QUADRATURE_ERROR * (mean := float(pressure.mean())):
+    if error > WARNING_ERROR * (mean := float(pressure.mean())):
         yield (
             f"contact '{contact.name}': the integration points of complete facets change nodal pressures by about "
             f"{error:.3g}, compared with a mean of {mean:.3g}: use formulation mortar, which integrates up to the edges of "

@@ -120,8 +120,8 @@ class FrictionSolution:
 # Function that solves an increment, given gaps and slips (1 + k, m) [length] to be added, the constraints (m,) that may
 # close, those of them that are closed initially, and initial forces (1 + k, m) [force] or None.
 IncrementSolver = Callable[[Array, Mask, Mask, Array | None], FrictionSolution]
-# Number of constraints that may close in one increment, relative to the number of closed ones. In 3D `in_increments`
-# admits more while few are closed.
+# Number of constraints that may close in one increment, relative to the number of closed ones. In 3D `in_increments` admits
+# more while few are closed. A contact in 2D that grows to 500 nodes closes in 130 increments, and in 500 if each closed one.
 GROWTH = 1 / 32
 
 

@@ -23,7 +23,8 @@ from fastcontact.mesh.topology import bodies
 if TYPE_CHECKING:
     import pandas
 
-# Relative difference of node distances, moduli or areas below which two sides count as equal.
+# Relative difference of node distances, moduli or areas below which two sides count as equal. Without it, the finer of two
+# similar meshes would count more than the softer body (`test_softer_bodies_are_secondary_and_pairs_by_name_stay`).
 EQUALITY_TOLERANCE = 0.1
 # Ratio of moduli above which the softer side is secondary, even if its mesh is coarser. With linear facets twice as fine on
 # the secondary side, pressures of mortar contact alternate by 0.03, 0.06, 0.10 and 0.14 of their mean if the secondary body

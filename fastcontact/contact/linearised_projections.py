@@ -147,7 +147,7 @@ class SurfacePoints:
         feet, coordinates, facet = pairing.extended_feet(rows), primary.coordinates, pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
         self.motion = shapes_at(shape, nodes, len(coordinates))
-        self.overhangs = pairing.beyond is not None and bool(pairing.beyond[rows].any())
+        self.overhangs = pairing.overhang_xi is not None and bool(pairing.overhang_xi[rows].any())
         self._feet, ascending = feet, np.argsort(feet.nodes, axis=1)
         self._foot_nodes = np.take_along_axis(feet.nodes, ascending, axis=1)
         self._weight_gradient = -np.take_along_axis(feet.gradient, ascending[:, :, None], axis=1)

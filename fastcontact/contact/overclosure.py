@@ -12,7 +12,8 @@ from fastcontact._tools.argument_types import number_pairs
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
-# Overclosure, in multiples of the clearance c0, beyond which the exponential law is linear.
+# Overclosure, in multiples of the clearance c0, beyond which the exponential law is linear. With 1,
+# `test_an_exponential_law` fails.
 LARGEST_OVERCLOSURE = 3.0
 
 

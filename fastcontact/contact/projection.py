@@ -31,8 +31,6 @@ from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PREC
 # Adjacent facets whose normals enclose a smaller angle [degrees] approximate a smooth surface; others form a corner. The
 # value differs from the exterior angles of all regular polygons, so that round-off has no influence on their normals.
 CORNER = 48.0
-# Points are sorted in space before a search, down to groups of at most this size, within which their order is arbitrary.
-POINTS_PER_LEAF = 16
 # Overhang up to which a point faces the end of a side [facet lengths]. Nodes on an axis or in a plane of symmetry lie
 # slightly beyond inclined facets. Nodes at the end of one side lie beyond the end of the other if both sides strain
 # differently.
@@ -274,7 +272,7 @@ def closest_of_types(points: Array, nodes_by_type: Sequence[Array]) -> Closest:
 
 def _project_onto_lines(points: Array, nodes: Array, closest: Closest) -> None:
     """Fill `closest` with the projections onto lines; the arguments are those of the function `closest`."""
-    numbers, order = tree_order(nodes[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
+    numbers, order = tree_order(nodes[:, 0].copy()), tree_order(points)
     nodes = nodes[numbers]
     hull = nodes
     if nodes.shape[1] == 3:  # a parabola lies in the triangle of its ends and this Bezier point
@@ -291,7 +289,7 @@ def _project_onto_faces(points: Array, nodes: Array, closest: Closest) -> None:
     from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 
     n, table = len(nodes), tables(nodes.shape[1])
-    numbers, order = tree_order(nodes[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
+    numbers, order = tree_order(nodes[:, 0].copy()), tree_order(points)
     centre = 0.5 * (nodes.min(axis=0).min(axis=0) + nodes.max(axis=0).max(axis=0))
     facets = Facets(nodes[numbers], centre, np.empty(nodes.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))

@@ -13,7 +13,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
-# Approximate number of sampled facets of each element type.
+# Approximate number of sampled facets of each element type. All pairs of two samples are compared.
 SAMPLE_SIZE = 200
 
 

@@ -29,6 +29,7 @@ MAX_FACTORISED_DOFS = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 # Relative residual that direct solutions attain.
 ATTAINABLE_RESIDUAL = ROUND_OFF / 100
 # Number of right-hand sides that are stored. Loads and supports seldom have more independent ramps.
+# `test_only_a_few_loads_are_kept`.
 STORED_LOADS = 4
 
 

@@ -13,9 +13,8 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.hanging_nodes import hanging_nodes, hanging_nodes_text
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import equal_rows
+from fastcontact.round_off import ROUND_OFF
 
-# Jacobians below this fraction of the square, in 3D of the cube, of the longest edge are attributed to round-off.
-_ROUND_OFF = 1e-12
 # Limits beyond which a cell is poor: the smallest ratio of the smallest to the largest Jacobian, the largest angle [degrees],
 # and the smallest ratio of the volume to the cube of the longest edge.
 MIN_JACOBIAN_RATIO, MAX_ANGLE, MIN_VOLUME_RATIO = 0.05, 175.0, 1e-4
@@ -213,7 +212,7 @@ def corner_angles(corners: Array) -> Array:
 def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
     """Return the area or volume (n_cells,) of the cells of one type, and the masks of degenerate and of inverted cells."""
     measure, min_det, max_det, longest = extremes(mesh, name)
-    tolerance = _ROUND_OFF * longest**mesh.dim
+    tolerance = ROUND_OFF * longest**mesh.dim
     degenerate = np.maximum(np.abs(min_det), np.abs(max_det)) <= tolerance
     return measure, degenerate, (min_det <= tolerance) & ~degenerate
 

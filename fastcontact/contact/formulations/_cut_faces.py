@@ -24,9 +24,11 @@ from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
 # Two facets are clipped if their distance along the normal is at most REACH times the sum of the radius of the secondary
-# facet and its distance from the closest primary facet.
+# facet and its distance from the closest primary facet. With 1, half of a facet is lost at an inclination of 80 degrees
+# (`test_facets_that_are_inclined_to_each_other_share_all`).
 REACH = 3.0
-# Work per secondary facet in the units of `parallel.portions`, which choose the number of threads.
+# Work per secondary facet in the units of `parallel.portions`, which choose the number of threads. A unit takes about 10 ns,
+# and a facet 5 us (tri3) to 70 us (quad8).
 EFFORT = 400
 
 
@@ -144,7 +146,7 @@ def _overlapping_pairs(secondary: _Polygons, primary: _Polygons, reach: Array) -
 
     `reach` (n_secondary,) are the largest distances at which facets are paired [length].
     """
-    numbers = tree_order(primary.origin, 1)
+    numbers = tree_order(primary.origin)
     corners = primary.nodes[numbers, : primary.n_corners]
     tree = build(corners.min(axis=1), corners.max(axis=1))
     capacity = 8 * (len(secondary.nodes) + len(primary.nodes))

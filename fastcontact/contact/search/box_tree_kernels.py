@@ -27,17 +27,17 @@ class Tree(NamedTuple):
 
 
 @interpretable_kernel
-def tree_order(points, leaf_size):
+def tree_order(points):
     """Return the permutation (n,) that sorts points (n, dim) by recursive bisection along the longest side.
 
     The number of points in the left half is a power of two, so that the facets below each box of the tree form one of these
-    parts. Parts of at most `leaf_size` points are not sorted, because it suffices that neighbours are processed in sequence.
+    parts.
     """
     n = points.shape[0]
     sorted_, order, size = points.copy(), np.arange(n), 1
     while size < n:
         size *= 2
-    while size > leaf_size:
+    while size > 1:
         for begin in range(0, n, size):
             if begin + size // 2 < n:
                 _halve(sorted_, order, begin, begin + size // 2, min(begin + size, n))

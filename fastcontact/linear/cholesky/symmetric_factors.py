@@ -12,7 +12,8 @@ from fastcontact._jit.parallel import on_one_blas_thread
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.linear.cholesky import triangular_kernels
 
-# Largest number of right-hand sides for which systems are solved simultaneously.
+# Largest number of right-hand sides for which systems are solved simultaneously. With 48, columns of K^-1 take 1.35 times as
+# long (12 288 unknowns in 3D), and with more no less.
 BATCH = 128
 
 

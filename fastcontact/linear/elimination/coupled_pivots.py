@@ -25,7 +25,8 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# Smallest admissible ratio of the sum of the absolute values in a row after lumping into nodal blocks to that before lumping.
+# Smallest admissible ratio of the sum of the absolute values in a row after lumping into nodal blocks to that before
+# lumping. Without it, `test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_many_columns` fails.
 SMALLEST_LUMPED_RATIO = 0.3
 Solve = Callable[[Array], Array]
 

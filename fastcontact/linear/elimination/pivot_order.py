@@ -31,13 +31,14 @@ from fastcontact.linear.elimination.coupled_pivots import (
 )
 from fastcontact.linear.sparse_rows import entry_rows
 
-# Smallest ratio of a pivot to the largest entry of its equation.
+# Smallest ratio of a pivot to the largest entry of its equation. Without it, `test_weak_unknowns_are_no_pivots` fails.
 SMALLEST_PIVOT = 0.25
 # Largest size of a block that is inverted instead of being factorised, and largest size of a block that is inverted if it
 # cannot be factorised (`test_many_coupled_equations_are_assigned_unknowns`). The latter is also the largest number of
 # equations whose pivots are chosen by a dense QR factorisation.
 LARGEST_BLOCK, LARGEST_DENSE = 64, 500
-# Largest number of layers of equations. The inverse is a sum with one product of sparse matrices for each layer.
+# Largest number of layers of equations. The inverse is a sum with one product of sparse matrices for each layer. With one,
+# `test_nodes_in_layers_have_a_sparse_inverse` fails.
 MAX_LAYERS = 4
 
 

@@ -26,6 +26,7 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, f
 from fastcontact.linear.springs import Springs
 
 # Smallest stiffening factor of a node for which the smoother and the coarser levels are corrected, see `stiffened_nodes`.
+# Without the correction, "modulus ratio 0.0001" takes 163 iterations instead of 18 (robustness table, 3 000 unknowns).
 SMALLEST_STIFFENING = 4.0
 
 

@@ -27,13 +27,18 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
-# Number of Lanczos steps for the largest eigenvalue, and safety factor of its estimate.
+# Number of Lanczos steps for the largest eigenvalue, and safety factor of its estimate. In the robustness table with 3 000
+# unknowns and friction, the base case takes 1 028 iterations instead of 22 with 3 steps, and tet4 28 instead of 15 without
+# the factor.
 LANCZOS_STEPS = 8
 SAFETY_FACTOR = 1.08
-# Ratio of the lower to the upper end of the interval of eigenvalues that is smoothed, and number of Chebyshev steps.
+# Ratio of the lower to the upper end of the interval of eigenvalues that is smoothed, and number of Chebyshev steps. In the
+# same table, "nu 0.499" takes 144 iterations instead of 109 with 1/4, and 163 with 2 steps; the base case 37 instead of 16
+# with 1/240.
 SMOOTHED_FRACTION = 1 / 24
 DEGREE = 3
-# Largest number of unknowns of a level that is not coarsened further and whose inverse is computed.
+# Largest number of unknowns of a level that is not coarsened further and whose inverse is computed. With 20, iterations in
+# the same table differ by at most two.
 COARSEST_SIZE = 200
 
 

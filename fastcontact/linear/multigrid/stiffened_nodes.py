@@ -21,10 +21,6 @@ from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.round_off import SINGLE_PRECISION
 
-# An unknown of the other side follows the pivots of its equations only if a unit translation of that side displaces these
-# pivots by at least this amount on average.
-SMALLEST_MOTION = 0.3
-
 
 class FreeMotions:
     """Smoother corrections for motions of stiffened nodes that move no pivot.
@@ -91,7 +87,8 @@ def follower_elimination(elimination: Elimination, nodes: Indices, size: int) ->
     # Displacement of each pivot due to unit translations of the opposite side along each direction.
     translation = csr_array((W.data[is_opposite], (W.row[is_opposite], direction[is_opposite])), shape=(m, size))
     pivot_motion = np.asarray((mean @ translation).toarray())
-    coupled = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= SMALLEST_MOTION * np.asarray(mean.sum(axis=1))
+    # Unknowns of which translations move no pivot do not follow.
+    coupled = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= SINGLE_PRECISION * np.asarray(mean.sum(axis=1))
     unknowns, mean, pivot_motion = unknowns[coupled], csr_array(mean[coupled]), pivot_motion[coupled]
     pivot_terms = csr_array((-W.data[~is_opposite], (W.row[~is_opposite], W.col[~is_opposite])), shape=(m, n))
     pivot_terms = pivot_terms + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))

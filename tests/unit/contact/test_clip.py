@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from models import united
 
+import fastcontact as fc
 from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.contact.formulations import _cut_faces_kernels
+from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._dual_basis import LARGEST_RMS, dual_functions, positive_basis
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import tables
+from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements, quadrature
 
 
@@ -26,7 +30,7 @@ def facing(secondary, primary, room=1000, reach=2.0):
     """Pairs of polygons (n, n_corners, 3) that face each other."""
     (origin, axes), (_, other_axes) = planes(secondary), planes(primary)
     radius = np.linalg.norm(secondary - origin[:, None], axis=2).max(axis=1)
-    numbers = tree_order(primary[:, 0].copy(), 1)
+    numbers = tree_order(primary[:, 0].copy())
     tree = build(primary.min(axis=1)[numbers], primary.max(axis=1)[numbers])
     pairs = np.empty((room, 2), np.intp)
     count = _cut_faces_kernels.facing_pairs(
@@ -169,6 +173,15 @@ def test_facets_that_look_the_same_way_or_lie_apart_share_nothing():
     assert facing(square, opposite + np.array([1.0, 0, 0]))[1] == 0
     assert facing(square, opposite)[1] == 1
     assert facing(square, grid(1, 1, 1.0, False), reach=0.2)[1] == 0
+
+
+def test_facets_that_are_inclined_to_each_other_share_all():
+    flat = fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), origin=(0.0, 0.0, -1.0))
+    inclined = fc.generate.box((3.0, 1.0, 1.0), (2, 1, 1), origin=(-1.0, 0.0, 0.0))
+    points = inclined.points + np.outer(inclined.points[:, 0], [0.0, 0.0, np.tan(np.radians(80.0))])
+    mesh = united(LOW_=flat, UP_=inclined.replace(points=points))
+    found = face_overlap(surface(mesh, "LOW_ZMAX"), surface(mesh, "UP_ZMIN"), mesh.points, mesh.points, None)
+    assert found.mass[0].sum() == pytest.approx(1.0, abs=1e-12)
 
 
 def test_all_pairs_of_large_grids_are_found():
