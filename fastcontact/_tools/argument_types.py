@@ -365,3 +365,11 @@ def finite_vector(values: Any, size: int) -> np.ndarray[Any, np.dtype[np.float64
     except (TypeError, ValueError):
         return None
     return vector if vector.shape == (size,) and np.isfinite(vector).all() else None
+
+
+def number_pairs(rows: Any) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """Return pairs of numbers as an array (n, 2), or None if `rows` are not pairs of numbers."""
+    try:
+        return np.array([[float(value) for value in row] for row in rows]).reshape(-1, 2)
+    except (TypeError, ValueError, OverflowError):
+        return None

@@ -99,8 +99,10 @@ def contact_result(
     distances = middle.distances(constraints.positions)
     along_tangent = distances if tangent is None else (constraints.positions - middle.position) @ tangent
     radius = half_width(distances, active, along_tangent)
-    if coordinates.shape[1] == 3 and closed[place.argmin()]:  # not a ring around an open middle
+    stick_bounds, sticking = None, closed & sticking
+    if coordinates.shape[1] == 3:
         radius = _radius_in_facets(pair, place, closed, *radius)
+        stick_bounds = _radius_in_facets(pair, place, sticking, *half_width(place, sticking))
     dry = None if pair.options.source is None else np.zeros(len(points))
     abscissa, obstacle_results = pair.secondary.abscissa, dict[str, Any]()
     if axis is not None:  # distance from the axis
@@ -127,7 +129,8 @@ def contact_result(
         force=total,
         radius=radius,
         shear=shear,
-        sticking=closed & sticking,
+        sticking=sticking,
+        stick_bounds=stick_bounds,
         middle=middle.position,
         place=place,
         tangent=tangent,
@@ -138,16 +141,18 @@ def contact_result(
     )
 
 
-def _radius_in_facets(pair: Formulation, place: Array, closed: Mask, low: float, high: float) -> tuple[float, float]:
-    """Return the bounds `ContactResult.radius` in 3D, given those of the constraints, `low` and `high` [length].
+def _radius_in_facets(pair: Formulation, place: Array, zone: Mask, low: float, high: float) -> tuple[float, float]:
+    """Return the bounds of the radius of the contact or stick zone in 3D, given `low` and `high` without facets [length].
 
-    The radius may depend on the direction, and facets of closed nodes (n_nodes,) may be only partly in contact. `place`
-    (n_nodes,) are the distances of the nodes from the middle [length].
+    The radius may depend on the direction, and facets of nodes of the `zone` (n_nodes,) may lie only partly in it. `place`
+    (n_nodes,) are the distances of the nodes from the middle [length]. The bounds of a ring are not changed.
     """
+    if not zone[place.argmin()]:
+        return low, high
     side = pair.secondary
-    free = ~closed & ~pair.excluded[side.points]
-    low = min(low, float(place[closed & (side.node_adjacency @ free > 0)].min(initial=np.inf)))
-    return low, max(high, float(place[free & (side.node_adjacency @ closed > 0)].max(initial=0.0)))
+    free = ~zone & ~pair.excluded[side.points]
+    low = min(low, float(place[zone & (side.node_adjacency @ free > 0)].min(initial=np.inf)))
+    return low, max(high, float(place[free & (side.node_adjacency @ zone > 0)].max(initial=0.0)))
 
 
 def _nodal_forces(

@@ -25,6 +25,8 @@ HALVINGS = 6
 # Steps are halved until they reduce a norm by this fraction of the expected reduction (Nocedal and Wright, 2006, equation
 # 3.4).
 DECREASE = 1e-4
+# Estimated relative error of a linear solution, relative to its residual.
+LINEAR_ERROR = 10.0
 # Largest number of Newton iterations: of a load step, for a friction law, and of the positions of floating bodies.
 MAX_NEWTON_ITERATIONS = 40
 

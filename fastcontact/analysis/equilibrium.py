@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._tools.records import field, record
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import LINEAR_ERROR, NOTABLE
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.problem import Problem, StepLoad
@@ -293,7 +293,7 @@ def _round_off(problem: Problem, product: Array, forces: tuple[Array, ...], scal
     for magnitudes in map(np.abs, forces):
         if ((magnitudes > noise) & (magnitudes * problem.criteria.relative > SUM_ROUND_OFF * product)).any():
             return force_round_off, noise
-    return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(product), force_round_off), noise
+    return max(max(ROUND_OFF, LINEAR_ERROR * problem.solver.tolerance) * largest(product), force_round_off), noise
 
 
 @record
@@ -328,19 +328,17 @@ class StepEquilibrium:
 
         For nonlinear bodies the history is that of Newton's method, and the numbers are sums over all Newton iterations.
         """
-        history, scatter = ([], None) if self.settled is None else (self.settled.iterate.history, self.settled.scatter)
-        counts: dict[str, Any] = {
-            "geometry_updates": max(len(history) - 1, 0),
+        pairings, scatter = ([], None) if self.settled is None else (self.settled.iterate.history, self.settled.scatter)
+        history, updates = pairings, max(len(pairings) - 1, 0)
+        if self.terms is not None:
+            history, updates = self.newton, sum(map(itemgetter("pairings"), self.newton))
+        return {
+            "geometry_updates": updates,
             "active_set_iterations": sum(map(itemgetter("active_set_iterations"), history)),
             "linear_iterations": linear_iterations,
             "history": history,
             **({} if scatter is None else {"scatter": scatter}),
         }
-        if self.terms is not None:
-            counts["history"] = self.newton
-            counts["geometry_updates"] = sum(map(itemgetter("pairings"), self.newton))
-            counts["active_set_iterations"] = sum(map(itemgetter("active_set_iterations"), self.newton))
-        return counts
 
 
 def solve_displacements(

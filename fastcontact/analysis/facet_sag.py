@@ -118,7 +118,7 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     pairing = pair.pair_candidates(points, configuration)
     rows = np.flatnonzero(pairing.paired)
     in_contact = closed[points.nodes[rows]].any(axis=1)
-    if smoothing is None or points.facet is None or points.xi is None or not in_contact.any():
+    if smoothing is None or not in_contact.any():
         return 0.0, 0.0
     sag = np.full(len(points.nodes), np.nan)
     on_primary = pairing.facet[rows], pairing.xi[rows]

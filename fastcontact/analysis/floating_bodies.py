@@ -36,9 +36,7 @@ from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.springs import Springs
-from fastcontact.linear.delassus import solve_multipliers
-from fastcontact.linear.field_compliance import FieldCompliance
-from fastcontact.linear.protocol import Loaded, Monitor
+from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
@@ -152,15 +150,6 @@ class SoftSprings(Loaded):
     modes: Array
     load: Array
     stiffness: float
-
-    def solve(
-        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        """See `Loaded`."""
-        free, F = self.delassus(B)
-        multiplier = solve_multipliers(F + self.rigid_compliance(B), c - free, C)
-        return self.full_solution(B.T @ multiplier), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
@@ -326,6 +315,7 @@ class FloatingBodies:
 
     def moving(self, rigid: RigidPosition) -> list[str]:
         """Return the motions of bodies in the free rigid-body modes with the largest generalised forces of the springs."""
+        # A message names the motions with the largest forces, within a factor of ten.
         work = np.abs(self._values_at_springs.T @ rigid.spring_force)
         return self.motions.combined(self._values_at_springs[:, work > 0.1 * work.max()]).names()
 

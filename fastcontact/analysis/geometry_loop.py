@@ -305,7 +305,8 @@ class _Mixing:
         step has the opposite sign of the product of the step with the change to the solution, `image` (k,).
         """
         end_slope = float(step @ (image - before))
-        # A minimum along the step lies between its start and its end. The secant of the slopes is limited for large ones.
+        # A minimum along the step lies between its start and its end. The secant of the slopes is limited to between a tenth
+        # and a half of the step (Dennis and Schnabel, 1983, section 6.3.2).
         if end_slope >= -0.5 * slope or fraction <= 2.0**-HALVINGS:
             return None
         fraction *= min(max(slope / (slope - end_slope), 0.1), 0.5)

@@ -15,6 +15,7 @@ import numpy as np
 from fastcontact._tools.records import record
 from fastcontact.analysis import active_set
 from fastcontact.analysis.convergence_messages import friction_exceeded, not_restrained
+from fastcontact.analysis.criteria import LINEAR_ERROR
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
@@ -274,7 +275,7 @@ class _FloatingContact:
         step, bodies, constraints, iterate = self.step, self.bodies, self.constraints, self.iterate
         problem, dofs, largest_load = step.problem, step.problem.dofs, step.state.largest_rigid_force
         start = iterate.u[bodies.dofs] if iterate.history else self.first_position()
-        relative_accuracy = 10 * max(problem.solver.tolerance, self.accuracy.residual or 0.0)
+        relative_accuracy = LINEAR_ERROR * max(problem.solver.tolerance, self.accuracy.residual or 0.0)
         position_response, round_off = None, step.state.gap_round_off
         if not problem.solver.iterative:  # the response requires many solutions, which are cheap if K is factorised
             position_response = partial(bodies.position_response, constraints, dofs)

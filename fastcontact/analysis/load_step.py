@@ -63,23 +63,24 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ConvergenceError
         If the step does not converge.
     """
-    load = load_without_conduction = problem.load_at(instant)
-    if problem.heat is not None:
-        rise = thermal_coupling.first_rise(problem, problem.heat, state, instant)
-        load = thermal_coupling.thermal_load(problem, load_without_conduction, rise)
+    load, heat = problem.load_at(instant), problem.heat
+    load_without_conduction = load
+    if heat is not None:
+        rise = thermal_coupling.first_rise(problem, heat, state, instant)
+        load = thermal_coupling.thermal_load(problem, load, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     step = prepare_start(problem, state, index, load)
-    temperatures, solution = None, newton_with_wear(step, load)
-    if problem.heat is not None:
-        temperatures, solution = thermal_coupling.settle_heat(
-            problem, step.state, load_without_conduction, instant, rise, solution, partial(newton_with_wear, step)
-        )
+    solution = newton_with_wear(step, load)
+    if heat is not None:
+        arguments = step.state, load_without_conduction, instant, rise, solution, partial(newton_with_wear, step)
+        temperatures, solution = thermal_coupling.settle_heat(problem, heat, *arguments)
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     step = replace(step, state=replace(step.state, wear=solution.wear))
-    final_rise = None if temperatures is None else temperatures.rise
-    end, result = _end_of_step(step, solution, instant, final_rise, iterations)
-    return end, result if temperatures is None else thermal_coupling.with_heat_results(problem, temperatures, result)
+    if heat is None:
+        return _end_of_step(step, solution, instant, None, iterations)
+    end, result = _end_of_step(step, solution, instant, temperatures.rise, iterations)
+    return end, thermal_coupling.with_heat_results(heat, temperatures, result)
 
 
 def _end_of_step(
@@ -129,10 +130,10 @@ def _end_of_step(
         end = replace(end, extrapolation=extrapolation)
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
-    if problem.floating_bodies is not None and end.rigid is not None and settled is not None:
+    if problem.floating_bodies is not None and settled is not None and (rigid := settled.iterate.rigid) is not None:
         # May be round-off relative to contact forces. Without loads it is zero, and contact forces are round-off.
         scale = end.largest_rigid_force
-        report = problem.floating_bodies.report(end.rigid, scale and max(scale, end.largest_force))
+        report = problem.floating_bodies.report(rigid, scale and max(scale, end.largest_force))
         forces = settled.constraints, settled.solution.multiplier
         free = problem.floating_bodies.undetermined(*forces, u, scale, balance.residual)
         moving = (np.abs(free.displacement) > SINGLE_PRECISION).any(axis=1)
@@ -164,7 +165,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         forces = generalised_forces(problem.floating_bodies.motions, load_as_force.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
     start = replace(
-        state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
+        state, gap_round_off=round_off, largest_rigid_force=rigid_force, last_change=None,
         largest_force=max(state.largest_force, largest(load_as_force.force)),
     )  # fmt: skip
     if problem.extrapolates:
@@ -247,7 +248,7 @@ def _contact_at_end(
     stored = sum(map(attrgetter("stored"), (*forces.values(), *bonds.values())))
     released = sum(map(attrgetter("released"), bonds.values()))
     end = replace(
-        end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
+        end, active=settled.iterate.active, pressure=settled.iterate.pressure,
         last_change=settled.last_change, never_opening=never_opening, elastic_slip=elastic_slip, bonds=bonds, worn=worn,
         wear={}, slipped=slipped, forces=forces, touched=frozenset(touched), first_contact=first_contact,
         work=start.work and start.work.after(energy, stored, work_increments.tolist(), released, work_on_wear),

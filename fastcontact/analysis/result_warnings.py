@@ -17,6 +17,7 @@ from fastcontact.analysis.interpenetration import Peak, interpenetration
 from fastcontact.analysis.kinematics_warnings import large_rotation, large_strain
 from fastcontact.analysis.locking import ALTERNATING, locking_warnings
 from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.resultants import pose_of
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import ratio_to_elastic_waves
 from fastcontact.arrays import Array, Mask, largest
@@ -24,13 +25,14 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import SAME_DIRECTION
 from fastcontact.contact.integration import areas_of_rule, fine_rule, lumped_areas
-from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
+from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.supported_nodes import nodes_with_undetermined_traction
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.model import Model
@@ -103,11 +105,9 @@ def result_warnings(
         at_edge = list(_pressure_peak_at_edge(pair, last, contact))
         if not pressures and index != last.index:
             peak = contacts[name]
-            at_peak = replace(Configuration.displaced(displacement), pose=_pose(peak))
-            texts = [
-                *_unresolved(problem, pair, at_peak, peak, state),
-                *pressure_oscillation(pair, peak, problem.model),
-            ]
+            at_peak = replace(Configuration.displaced(displacement), pose=pose_of(peak))
+            texts = _unresolved(problem, pair, at_peak, peak, state)
+            texts += pressure_oscillation(pair, peak, problem.model)
             texts += [] if at_edge else _pressure_peak_at_edge(pair, last, peak)
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += pressures or _shear_oscillation(pair, contact)
@@ -127,23 +127,14 @@ def _unresolved(
     return [*edge, *(coarse if coarse and isinstance(pair.primary, RigidSide) else sag or coarse)]
 
 
-def _pose(contact: ContactResult) -> Pose:
-    """Return the displacement and the rotation of the rigid obstacle of a contact at the end of a step."""
-    still = np.zeros(contact.coordinates.shape[1])
-    displacement = contact.obstacle_displacement
-    return Pose(still if displacement is None else displacement, contact.obstacle_angle or 0.0)
-
-
 def _sliding_past_ends(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     """Yield a warning if surfaces slide past each other at periodic ends, beyond which there is no opposite facet."""
     if isinstance(pair.primary, RigidSide):  # it continues beyond the ends
         return
     distance, points = 0.0, pair.points[pair.secondary.points]
     for first, second, _ in pair.secondary.periodic_ends:
-        across = points[second] - points[first]
-        direction = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), TINY)
         slip = contact.slip_total[first] * contact.active[first, None]
-        distance = max(distance, largest((slip * direction).sum(axis=1)))
+        distance = max(distance, largest((slip * unit_vectors(points[second] - points[first])).sum(axis=1)))
     ratio, is_dual = distance / facet_length(pair.secondary, pair.points), getattr(pair, "multipliers", "") == "dual"
     if ratio > (SLIDE_PAST_ENDS_DUAL if is_dual else SLIDE_PAST_ENDS):
         yield (
@@ -397,7 +388,7 @@ def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> 
         if contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
             yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
         return
-    closed = _or_between_closed(contact.active, _alternation_matrix(pair.secondary))
+    closed = _or_between_closed(contact.active, pair.secondary)
     count = facets_across_radius(pair.secondary, closed, pair.excluded[pair.secondary.points])
     if count is not None and count < MIN_FACETS_ACROSS_RADIUS:
         resolution = f"{count} {'elements' if count > 1 else 'element'} across its radius"
@@ -465,23 +456,14 @@ def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model
     if pair.options.kind in ALWAYS_CLOSED or pair.options.cohesion is not None:
         return
     side = pair.secondary
-    others = _alternation_matrix(side)
-    count = np.asarray(others.sum(axis=1)).ravel()
-    closed = _or_between_closed(contact.active, others)
-    inside = closed & (side.node_adjacency @ ~closed == 0) & (count > 0)
-    if inside.sum() < MIN_NODES:
-        return
-    pressure, mean = contact.pressure[inside], (others @ contact.pressure)[inside] / count[inside]
-    difference = np.abs(pressure - mean)
-    ratio = float(np.median(difference / np.maximum(0.5 * (pressure + mean), TINY)))
+    inside, ratio, difference = _alternation(side, contact.pressure[:, None], _or_between_closed(contact.active, side))
     limit = ALTERNATING_ON_LINES if side.order == 2 and pair.points.shape[1] == 2 else ALTERNATING
-    if ratio <= limit or not pressure.mean() > 0.0:
-        return
-    yield (
-        f"contact '{contact.name}': nodal pressures oscillate from node to node, typically by {0.5 * ratio:.0%} above and "
-        f"below their local mean, and by up to {0.5 * difference.max():.3g}: trust means over neighbouring nodes, or "
-        f"{_oscillation_remedy(pair, model)}"
-    )
+    if ratio > limit and contact.pressure[inside].mean() > 0.0:
+        yield (
+            f"contact '{contact.name}': nodal pressures oscillate from node to node, typically by {0.5 * ratio:.0%} above "
+            f"and below their local mean, and by up to {0.5 * difference.max():.3g}: trust means over neighbouring nodes, or "
+            f"{_oscillation_remedy(pair, model)}"
+        )
 
 
 def _quadrature_error(
@@ -520,16 +502,10 @@ def _shear_oscillation(pair: Formulation, contact: ContactResult) -> Iterator[st
     a coefficient of friction of one, with 5, 20 and 80 load steps, the measure is 0.65, 0.96 and 1.0 on quad8 cells, and 0.42
     with half the facets; 0.55 on tri6 cells; 0.14 on quad4 cells; and up to 0.1 with mortar. Local means are accurate.
     """
-    side = pair.secondary
-    others, adheres = _alternation_matrix(side), contact.sticking & contact.active
-    count = np.asarray(others.sum(axis=1)).ravel()
-    inside = adheres & (side.node_adjacency @ ~adheres == 0) & (count > 0)
-    is_on_lines = side.order == 2 and pair.points.shape[1] == 2
-    if not is_on_lines or pair.name == "mortar" or pair.options.kind in ALWAYS_CLOSED or inside.sum() < MIN_NODES:
+    is_on_lines = pair.secondary.order == 2 and pair.points.shape[1] == 2
+    if not is_on_lines or pair.name == "mortar" or pair.options.kind in ALWAYS_CLOSED:
         return
-    shear, mean = contact.shear[inside], (others @ contact.shear)[inside] / count[inside, None]
-    difference, size = np.linalg.norm(shear - mean, axis=1), np.linalg.norm(shear, axis=1)
-    ratio = float(np.median(difference / np.maximum(0.5 * (size + np.linalg.norm(mean, axis=1)), TINY)))
+    inside, ratio, difference = _alternation(pair.secondary, contact.shear, contact.sticking & contact.active)
     if ratio > SHEAR_ALTERNATING and 0.5 * np.median(difference) > NOTABLE * contact.pressure[inside].mean():
         yield (
             f"contact '{contact.name}': nodal shear of sticking nodes oscillates from node to node, typically by "
@@ -624,8 +600,30 @@ def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: Contact
         )
 
 
-def _or_between_closed(closed: Mask, others: csr_array) -> Mask:
-    """Return the `closed` nodes (n_nodes,) and those between closed nodes only, given the `_alternation_matrix`."""
+def _alternation(side: Surface, values: Array, selected: Mask) -> tuple[Mask, float, Array]:
+    """Return how much vectors (n_nodes, k) at `selected` nodes (n_nodes,) alternate; see `pressure_oscillation`.
+
+    Returns
+    -------
+    inside : ndarray of bool (n_nodes,)
+        Nodes whose neighbours are all selected.
+    ratio : float
+        Median of the relative differences; zero if there are too few nodes [-].
+    difference : ndarray (n_inside,)
+        Distances between the vectors inside and the means of their neighbours.
+    """
+    others = _alternation_matrix(side)
+    count = np.asarray(others.sum(axis=1)).ravel()
+    inside = selected & (side.node_adjacency @ ~selected == 0) & (count > 0)
+    own, mean = values[inside], (others @ values)[inside] / count[inside, None]
+    difference, *sizes = (np.linalg.norm(vectors, axis=1) for vectors in (own - mean, own, mean))
+    relative = difference / np.maximum(0.5 * (sizes[0] + sizes[1]), TINY)
+    return inside, float(np.median(relative)) if inside.sum() >= MIN_NODES else 0.0, difference
+
+
+def _or_between_closed(closed: Mask, side: Surface) -> Mask:
+    """Return the `closed` nodes (n_nodes,) and those between closed nodes only, in the sense of `_alternation_matrix`."""
+    others = _alternation_matrix(side)
     return closed | ((others @ ~closed == 0) & (np.diff(others.indptr) > 0))
 
 

@@ -178,14 +178,20 @@ def _at_periodic_interfaces(
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
     pairs = [np.empty((2, 0), np.intp)]
-    for rows in constraints.rows.values() if interfaces else ():
-        usable_rows = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
-        largest_node = max(int(end.max()) for interface in interfaces for end in interface[:2])
-        row = np.full(max(largest_node, int(nodes.max())) + 1, -1)
-        row[nodes[usable_rows]] = usable_rows
-        for interface in interfaces:
-            rows_of_ends = row[np.stack([interface.first, interface.second])]
-            pairs.append(rows_of_ends[:, (rows_of_ends >= 0).all(axis=0) & (rows_of_ends[0] != rows_of_ends[1])])
+    for name, rows in constraints.rows.items() if interfaces else ():
+        branches, largest_node = (
+            constraints.parts[name].branches,
+            max(int(end.max()) for i in interfaces for end in i[:2]),
+        )
+        # A cohesive layer has one equation for the opening and one for each slip at each node.
+        n_equations = 1 if branches is None else (rows.stop - rows.start) // len(branches)
+        for block in np.split(np.arange(rows.start, rows.stop), n_equations):
+            usable_rows = block[usable[block] & (nodes[block] >= 0)]
+            row = np.full(max(largest_node, int(nodes.max())) + 1, -1)
+            row[nodes[usable_rows]] = usable_rows
+            for interface in interfaces:
+                rows_of_ends = row[np.stack([interface.first, interface.second])]
+                pairs.append(rows_of_ends[:, (rows_of_ends >= 0).all(axis=0) & (rows_of_ends[0] != rows_of_ends[1])])
     ends = np.hstack(pairs)
     return ends[:, constraints.equality[ends[0]] == constraints.equality[ends[1]]]
 

@@ -57,7 +57,7 @@ def next_stage(
         return problem, state
     problem = prepare(stage)
     solver = problem.solver.snapshot()
-    return problem, replace(state, solver=solver, extrapolation=Extrapolation(), rigid=None, locked=values)
+    return problem, replace(state, solver=solver, extrapolation=Extrapolation(), locked=values)
 
 
 def _names(model: Model) -> list[str]:

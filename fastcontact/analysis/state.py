@@ -10,7 +10,6 @@ import numpy as np
 
 from fastcontact._tools.records import field, record
 from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.floating_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
@@ -87,8 +86,6 @@ class State:
     last_change : (int, float), optional
         The number of geometry updates in the last step, if it was prescribed, and the relative change of the displacements
         in the last of these updates.
-    rigid : RigidPosition, optional
-        Rigid position of floating bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
         History variables of nonlinear bodies, by element type, see `constitutive_kernels`; empty before the first step.
     flow : (float, float)
@@ -125,7 +122,6 @@ class State:
     work: Work | None = None
     forces: Mapping[str, ContactForces] = field(default_factory=dict)
     last_change: tuple[int, float] | None = None
-    rigid: RigidPosition | None = None
     history: Mapping[str, Array] = field(default_factory=dict)
     flow: tuple[float, float] = (0.0, 0.0)
     rise: Array | None = None

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from fastcontact._tools.records import replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import LINEAR_ERROR, NOTABLE
 from fastcontact.analysis.equilibrium import StepEquilibrium
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Heat, Temperatures
@@ -34,10 +34,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
 
 
-def with_heat_results(problem: Problem, temperatures: Temperatures, step: StepResult) -> StepResult:
+def with_heat_results(heat: Heat, temperatures: Temperatures, step: StepResult) -> StepResult:
     """Return the result of a load step with heat fluxes and heat reactions added."""
-    assert problem.heat is not None
-    cell_flux = problem.heat.conduction_at(step.displacement).flux(temperatures.rise)
+    cell_flux = heat.conduction_at(step.displacement).flux(temperatures.rise)
     with_flux = {name: replace(step.contact[name], heat_flux=flux) for name, flux in temperatures.fluxes.items()}
     return replace(
         step, contact=step.contact | with_flux, heat_reaction=temperatures.reaction,
@@ -55,14 +54,16 @@ def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Ar
 
 
 def settle_heat(
-    problem: Problem, start: State, load: StepLoad, instant: float, rise: Array, equilibrium: StepEquilibrium,
-    solve: Solve,
+    problem: Problem, heat: Heat, start: State, load: StepLoad, instant: float, rise: Array,
+    equilibrium: StepEquilibrium, solve: Solve,
 ) -> tuple[Temperatures, StepEquilibrium]:  # fmt: skip
     """Return the temperatures and the equilibrium of a load step.
 
     Parameters
     ----------
     problem : Problem
+    heat : Heat
+        Heat conduction of the problem.
     start : State
         State at the beginning of the step.
     load : StepLoad
@@ -81,12 +82,11 @@ def settle_heat(
     ConvergenceError
         If temperatures and contact do not converge.
     """
-    heat, mixing = problem.heat, Anderson(DEPTH, np.arange(len(rise)))
-    assert heat is not None
-    tolerance = max(problem.criteria.geometry, 10 * heat.linear_tolerance)
+    mixing = Anderson(DEPTH, np.arange(len(rise)))
+    tolerance = max(problem.criteria.geometry, LINEAR_ERROR * heat.linear_tolerance)
     change, limit = np.inf, max(problem.criteria.max_geometry_updates, 1)
     for exchange in range(1, limit + 1):
-        temperatures = _steady_temperatures(problem, start, load, instant, equilibrium)
+        temperatures = _steady_temperatures(problem, heat, start, load, instant, equilibrium)
         difference = temperatures.rise - rise
         change = largest(difference)
         settled = change <= tolerance * largest(temperatures.rise) or not problem.model.expands
@@ -125,12 +125,10 @@ def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
 
 
 def _steady_temperatures(
-    problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium
+    problem: Problem, heat: Heat, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium
 ) -> Temperatures:
     """Return the temperatures for the contact conductances and the frictional heat of an equilibrium."""
-    settled, u = equilibrium.settled, equilibrium.u
-    heat, displacement = problem.heat, problem.displacement(u)
-    assert heat is not None
+    settled, u, displacement = equilibrium.settled, equilibrium.u, problem.displacement(equilibrium.u)
     n, laws, conducting = problem.model.mesh.n_points, problem.model.conductances(), {}
     matrix, obstacles = csr_array((n, n)), csr_array((n, n))
     friction_power, obstacle_power = np.zeros((2, n))

@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.criteria import LINEAR_ERROR, Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.arrays import Array, largest
 from fastcontact.linear.protocol import LinearSolver
@@ -79,7 +79,7 @@ class Tolerances:
         end. Surfaces are then paired again after one iteration of the active set or one Newton step of friction.
         """
         inexact = self.solver.iterative and self.residual > self.solver.tolerance
-        relative_error = max(10 * self.solver.tolerance, self.residual if self.solver.iterative else 0.0)
+        relative_error = max(LINEAR_ERROR * self.solver.tolerance, self.residual if self.solver.iterative else 0.0)
         return Accuracy(
             gap=max(relative_error * (scale or self.first_scale), self.round_off),
             multiplier=relative_error,
@@ -131,6 +131,7 @@ class ScatterWindow:
         # Displacements that move in one direction are about `window` changes apart, those that oscillate about one change.
         if decreasing or scatter["displacement"] * size > half * float(np.median(changes)):
             return None
+        # Contact forces are more sensitive to round-off than displacements.
         acceptable = scatter["displacement"] <= SINGLE_PRECISION and scatter["force"] <= 100 * SINGLE_PRECISION
         return scatter if acceptable else None
 

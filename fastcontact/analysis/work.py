@@ -49,8 +49,7 @@ class ContactForces:
     tangential : ndarray (n_points, dim)
         Nodal forces of the tangential contact forces [force].
     pressing, added : ndarray (n_nodes,)
-        Normal forces on the secondary nodes [force], and the contribution of clearances to their gaps [length]. In
-        restart data of early versions, it includes wear.
+        Normal forces on the secondary nodes [force], and the contribution of clearances to their gaps [length].
     stored : float
         Energy of penalties, normal and tangential [energy].
     areas : ndarray (m,)
@@ -263,8 +262,7 @@ def contact_work(
     work_after, energy_after = after.normal_work(before, displacement)
     work_before, energy_before = before.normal_work(after, displacement)
     gained = work_after + work_before + energy_after - energy_before
-    if before.areas.size:
-        gained -= 0.5 * float((after.pressing_with(before) + before.pressing_with(after)) @ (after.added - before.added))
+    gained -= 0.5 * float((after.pressing_with(before) + before.pressing_with(after)) @ (after.added - before.added))
     gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())
     return after, (float(work.sum()), touching, gained - (after.stored - before.stored) - sliding), slip_integrals
 

@@ -39,6 +39,10 @@ DECK_SUFFIX = ".inp"
 _PACKAGE = Path(__file__).resolve().parents[1]
 # Folders of the ready-made cases, in an installed package and in a checkout.
 _CASE_FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
+# Possessive quantifiers and the lookbehind keep the search linear in the length of the line.
+_DECIMAL_COMMA = re.compile(
+    r"(?<![\w.-])(?P<key>[\w.-]++)\s*+=\s*+(?P<whole>[+-]?\d++),(?P<digits>\d++(?:[eE][+-]?\d+)?)"
+)
 
 
 def ready_made_cases() -> dict[str, Path]:
@@ -252,9 +256,27 @@ def _read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     try:
         return text, toml_text.parse(text)
     except ValueError as error:
-        twice = re.search(r"Cannot declare \('(\w+)',\) twice", str(error))
-        hint = f". If there are several, write [[{twice[1]}]] above each" if twice and twice[1] in LISTS else ""
-        raise CaseError(f"the case file '{path}' is not valid TOML: {error}{hint}") from error
+        reason = _frequent_mistake(text, str(error)) or error
+        raise CaseError(f"the case file '{path}' is not valid TOML: {reason}") from error
+
+
+def _frequent_mistake(text: str, message: str) -> str:
+    """Return the line, the key and the remedy of a frequent mistake, or an empty string for other messages of the parser.
+
+    The frequent mistakes are a decimal comma, and one of several tables in single brackets.
+    """
+    lines, place = text.replace("\r\n", "\n").rstrip().split("\n"), re.search(r"at line (\d+), column (\d+)", message)
+    number, column = (int(place[1]), int(place[2]) - 1) if place else (len(lines), len(lines[-1]))
+    line = lines[number - 1] if number <= len(lines) else ""
+    for comma in _DECIMAL_COMMA.finditer(line):
+        if comma.end("whole") <= column <= comma.end():  # the comma, or the end of the number in inline tables
+            key, correct = comma["key"], f"{comma['whole']}.{comma['digits']}"
+            return f"line {number}: '{key}' has a decimal comma: write {key} = {correct}"
+    table = re.match(r"\s*\[\[?\s*(\w+)\s*\]", line)
+    if table and "Cannot" in message and table[1] in (*LISTS, "check", "sensitivity", "contact", "obstacle"):
+        header = f"[{table[1]}.NAME]" if table[1] in ("contact", "obstacle") else f"[[{table[1]}]]"
+        return f"line {number}: there is a table [{table[1]}] above: if there are several, write {header} above each"
+    return ""
 
 
 def _reading_error(path: Path, error: Exception) -> str:
@@ -354,10 +376,12 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list
 
 
 def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
-    """Return the mesh of the table ``[mesh]``, from a file or a generator."""
+    """Return the mesh of the table ``[mesh]``, from a file, several files that are joined, or a generator."""
     if "file" in data:
-        check_keys("mesh", data, {"file": str, "name": str})
-        return read_mesh(folder / data["file"], mesh_name=data.get("name"))
+        check_keys("mesh", data, {"file": (str, list), "name": str})
+        if isinstance(data["file"], str):
+            return read_mesh(folder / data["file"], mesh_name=data.get("name"))
+        return _joined(folder, data["file"], data.get("name"))
     if "generator" not in data:
         raise CaseError("'mesh' needs either the key 'file' or the key 'generator'")
     from fastcontact.mesh.generate import GENERATORS
@@ -366,6 +390,23 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     check_known("mesh.generator", name, GENERATORS, CaseError)
     arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items() if key != "generator"}
     return call_with_keys("mesh", GENERATORS[name], arguments)
+
+
+def _joined(folder: Path, files: list[Any], name: str | None) -> Mesh:
+    """Return the union of the meshes in several files. Raises CaseError if two of them have a group of the same name."""
+    from fastcontact.mesh.generate import union
+
+    if not files or not all(isinstance(file, str) for file in files):
+        raise CaseError(f"'mesh.file' must be a path or a list of paths, not {files!r}")
+    meshes, file_of = [read_mesh(folder / file, mesh_name=name) for file in files], dict[str, str]()
+    for file, mesh in zip(files, meshes, strict=True):
+        for group in {**mesh.cell_groups, **mesh.point_groups}:
+            if group in file_of:
+                raise CaseError(
+                    f"mesh.file: '{file_of[group]}' and '{file}' both have a group '{group}': rename one of them"
+                )
+        file_of |= dict.fromkeys({**mesh.cell_groups, **mesh.point_groups}, file)
+    return union(*meshes)
 
 
 def _ramp(data: dict[str, Any]) -> Ramp:

@@ -24,13 +24,24 @@ _TOML_WORDS = {
     "True or False": "true or false",
     **dict.fromkeys((" or a function", " or None"), ""),
 }
+
+
+def kinds_of(function: Callable[..., Any]) -> dict[str, Any]:
+    """Return the arguments of a function as keys of a table: with the type bool if they are Boolean, otherwise with None.
+
+    Functions check the types of their arguments, but admit the numbers 0 and 1 as Boolean arguments.
+    """
+    annotations = {key: str(p.annotation) for key, p in inspect.signature(function).parameters.items()}
+    return {key: bool if text in ("bool", "bool | None") else None for key, text in annotations.items()}
+
+
 # Keys of the tables of a case file, with the TOML types of their values.
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
 SOLVE: dict[str, Any] = {
     "linear_solver": str,
     "linear_tolerance": NUMBER,
-    **dict.fromkeys(Criteria.__dataclass_fields__),
+    **kinds_of(Criteria),
 }
 # Keys of a rigid surface that consists of the facets of a group, in a file or in the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
@@ -80,18 +91,24 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterab
             )
         if key not in known:
             raise CaseError(unknown("key", label, [f"{where}.{k}" if where else k for k in known]))
-        kinds = known[key] if isinstance(known[key], tuple | None) else (known[key],)
-        if kinds is not None and (not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds)):
-            if kinds == (list,) and isinstance(value, dict):
-                raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
-            if dict in kinds and isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
-                name = ".NAME" if label in ("contact", "obstacle") else ""
-                raise CaseError(f"write [{label}{name}] in place of [[{label}]]")
-            names = " or ".join(kind.__name__ for kind in kinds)
-            raise CaseError(f"the value of '{label}' must be of type {names}, not {reprlib.repr(value)}")
+        check_kind(label, value, known[key])
     for key in required:
         if key not in data:
             raise CaseError(f"{where} needs '{key}'")
+
+
+def check_kind(label: str, value: Any, kind: Any) -> None:
+    """Raise CaseError unless the value of a key has the type or one of the types `kind`; None admits any value."""
+    kinds = kind if isinstance(kind, tuple | None) else (kind,)
+    if kinds is None or (isinstance(value, kinds) and (bool in kinds or not isinstance(value, bool))):
+        return
+    if kinds == (list,) and isinstance(value, dict):
+        raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
+    if dict in kinds and isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
+        name = ".NAME" if label in ("contact", "obstacle") else ""
+        raise CaseError(f"write [{label}{name}] in place of [[{label}]]")
+    names = "true or false" if kinds == (bool,) else "of type " + " or ".join(kind.__name__ for kind in kinds)
+    raise CaseError(f"the value of '{label}' must be {names}, not {reprlib.repr(value)}")
 
 
 def check_settings(data: Mapping[str, Any]) -> None:
@@ -119,7 +136,7 @@ def call_with_keys(where: str, function: Callable[..., Any], arguments: dict[str
     Raises CaseError if a key is unknown or missing, or if the function rejects the type or the value of a key.
     """
     parameters = inspect.signature(function).parameters
-    check_keys(where, arguments, dict.fromkeys(parameters))
+    check_keys(where, arguments, kinds_of(function))
     if missing := [key for key, p in parameters.items() if p.default is p.empty and key not in arguments]:
         raise CaseError(f"'{where}' needs {' and '.join(repr(key) for key in missing)}")
     try:

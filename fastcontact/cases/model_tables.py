@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fastcontact.cases import keys
-from fastcontact.cases.keys import NUMBER, call_with_keys, check_keys, errors_at, list_of_tables
+from fastcontact.cases.keys import NUMBER, call_with_keys, check_keys, check_kind, errors_at, kinds_of, list_of_tables
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -118,27 +118,29 @@ LISTS = tuple(FUNCTIONS)
 
 @functools.cache
 def keys_of_list(kind: str) -> tuple[dict[str, Any], list[str]]:
-    """Return the keys of the tables of a kind, one of `LISTS`, with None for each, and the required keys.
+    """Return the keys of the tables of a kind, one of `LISTS`, with their types as in `kinds_of`, and the required keys.
 
     The keys are the arguments of the functions that add the tables to a model, which check the types of the values.
     """
     if kind == "material":  # its required keys depend on the law
-        constants = [key for law in _LAW_DESCRIPTIONS for key in inspect.signature(law).parameters]
-        return dict.fromkeys(["groups", "law", *constants]), []
+        constants = {key: known for law in _LAW_DESCRIPTIONS for key, known in kinds_of(law).items()}
+        return {"groups": None, "law": None, **constants}, []
     is_temperature = kind == "temperature"  # it needs either a value or a file
     functions: list[Callable[..., None]] = [FUNCTIONS[kind]]
     if is_temperature:
         functions = [Model.add_temperature, Model.add_temperature_file]
-    keys, required = ["place"] if kind == "coupling" else [], []
+    required: list[str] = []
+    known: dict[str, Any] = {"place": None} if kind == "coupling" else {}
     for function in functions:
+        kinds = kinds_of(function)
         _, *parameters = inspect.signature(function).parameters.values()  # the first one is the model
         for parameter in parameters:
             if parameter.kind is parameter.VAR_KEYWORD:
-                keys += COMPONENTS if parameter.name == "tensor_components" else "xyz"
+                known |= dict.fromkeys(COMPONENTS if parameter.name == "tensor_components" else "xyz")
             else:
-                keys.append(parameter.name)
+                known[parameter.name] = kinds[parameter.name]
                 required += [parameter.name] * (parameter.default is parameter.empty and not is_temperature)
-    return dict.fromkeys(keys), required
+    return known, required
 
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
@@ -192,11 +194,20 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
             if not isinstance(entry.get(key), str):
                 hint = "".join(f"; rename '{word}' to '{key}'" for word in entry if OTHER_WORDS.get(word) == key)
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets{hint}")
+        _check_kinds(f"contact.{name}", entry, Model.add_contact)
         with errors_at(f"contact.{name}"):
             model.add_contact(name, **entry)
     if pairs == "auto" or "contacts" in data:
+        _check_kinds("contacts", data.get("contacts", {}), Model.add_contacts)
         with errors_at("contacts"):
             model.add_contacts(**data.get("contacts", {}))
+
+
+def _check_kinds(where: str, entry: Mapping[str, Any], function: Callable[..., Any]) -> None:
+    """Raise CaseError if a key of a table has another type than the Boolean argument of the same name of a function."""
+    kinds = kinds_of(function)
+    for key, value in entry.items():
+        check_kind(f"{where}.{key}", value, kinds.get(key))
 
 
 def _cut_sections(mesh: Mesh, sections: Any) -> Mesh:
@@ -229,6 +240,7 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     if not isinstance(entry, dict) or not isinstance(entry.get("secondary"), str):
         raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
     options = {key: value for key, value in entry.items() if key != "shape"}
+    _check_kinds(where, options, Model.add_obstacle)
     shape = entry.get("shape")
     if shape == "mesh":  # then the arguments of the shape are keys of the obstacle
         shape = {"kind": "mesh", **{key: options.pop(key) for key in keys.SURFACE if key in options}}

@@ -54,16 +54,19 @@ def _lines(path: Path) -> list[str]:
 
 
 def copy_case(case_path: Path, target: Path) -> list[Path]:
-    """Copy a case file and its mesh file, if it has one, and return the new paths. Raises FileError if a path exists."""
+    """Copy a case file and its mesh files, if it has any, and return the new paths. Raises FileError if a path exists."""
     from fastcontact._tools.paths import replacing
 
     text = case_path.read_text(encoding="utf-8")
     mesh_table: dict[str, Any] = tomllib.loads(text).get("mesh", {})
     files = {target: text.encode()}
     if "file" in mesh_table:
-        source = case_path.parent / mesh_table["file"]
-        files = {target: text.replace(f'"{mesh_table["file"]}"', f'"{source.name}"').encode()}
-        files[target.parent / source.name] = source.read_bytes()
+        named = mesh_table["file"]
+        for file in [named] if isinstance(named, str) else named:
+            source = case_path.parent / file
+            text = text.replace(f'"{file}"', f'"{source.name}"')
+            files[target.parent / source.name] = source.read_bytes()
+        files[target] = text.encode()
     for path in files:
         if path.exists():
             raise FileError(f"'{path}' already exists: name another file with -o, or remove it first")

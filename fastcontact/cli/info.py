@@ -35,6 +35,7 @@ def run(options: Namespace) -> int:
             rows = [*_mesh_lines(results.mesh), *_result_lines(results)]
     elif _is_case(file):
         from fastcontact.cases.case import read_case
+        from fastcontact.model.hanging_nodes import hanging_nodes_warning
 
         case = read_case(options.file)
         rows = [f"{options.file}: {case.title}", repr(case.model)]
@@ -42,6 +43,7 @@ def run(options: Namespace) -> int:
             rows.append(f"load factors: {', '.join(f'{t:g}' for t in case.ramp.instants)}")
             rows += [f"  note: {text}" for text in case.deck.notes]
         rows += _mesh_lines(case.mesh)
+        rows += [f"warning: {text}" for text in (hanging_nodes_warning(case.model),) if text]
     else:
         from fastcontact.mesh.files.mesh_files import read_mesh_report
         from fastcontact.mesh.quality import quality

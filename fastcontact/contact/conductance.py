@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact._tools.argument_types import number_pairs
 from fastcontact._tools.records import record
 from fastcontact.arrays import Array
 from fastcontact.contact.surface import Surface
@@ -57,12 +58,9 @@ class Conductance:
 
     def _table(self, rows: Any) -> Array:
         """Return pairs as an array (n, 2)."""
-        try:
-            table = np.array([[float(value) for value in row] for row in rows]).reshape(-1, 2)
-        except (TypeError, ValueError):
-            raise self._invalid() from None
-        ascending = (np.diff(table[:, 0]) > 0.0).all()
-        if not (len(table) and np.isfinite(table).all() and ascending and table.min() >= 0.0):
+        table = number_pairs(rows)
+        ascending = table is not None and np.isfinite(table).all() and (np.diff(table[:, 0]) > 0.0).all()
+        if table is None or not ascending or not len(table) or table.min() < 0.0:
             raise self._invalid()
         return table
 

@@ -28,7 +28,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import FACING
 from fastcontact.contact.projection import closest
 from fastcontact.contact.surface import Surface
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 @record
@@ -166,7 +166,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
             points[moved] = nodes[first[0]] + (points[moved] - nodes[second[0]]) @ rotation
             normal[moved] = normal[moved] @ rotation
     # Weights of the nodes for the centre of pressure; magnitudes if tension nearly cancels or exceeds compression.
-    weight = force if float(force.sum()) > 1e-6 * float(np.abs(force).sum()) else np.abs(force)
+    weight = force if float(force.sum()) > SINGLE_PRECISION * float(np.abs(force).sum()) else np.abs(force)
     if (total := float(weight.sum())) > 0:
         weight = weight / total
     else:

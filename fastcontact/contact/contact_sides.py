@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.held_motions import HeldMotions, reflected, symmetry_planes
+from fastcontact.contact.linearised_projections import ObstaclePoints, Points, SurfacePoints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import (
@@ -29,9 +31,10 @@ from fastcontact.contact.projection import SMALL_OVERHANG, interpolate
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.errors import ContactError, unknown
-from fastcontact.linear.sparse_rows import rows_of
+from fastcontact.linear.sparse_rows import rows_of, shapes_at
 from fastcontact.mesh import elements
-from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
+from fastcontact.mesh.area_vectors import unit_vectors
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 SLIPS = ("symmetric", "primary")
 
@@ -140,8 +143,8 @@ class ContactSides:
     def _secondary_normals(self, candidates: Candidates, config: Configuration) -> Array:
         """Return averaged unit normals (n, dim) of the secondary side at candidates."""
         nodal_normals = config.deformed(self.secondary, self.points).nodal_normals
-        normal = np.einsum("nk,nkd->nd", candidates.shape, nodal_normals[self.number_on_side[candidates.nodes]])
-        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
+        at_nodes = nodal_normals[self.number_on_side[candidates.nodes]]
+        return unit_vectors(np.einsum("nk,nkd->nd", candidates.shape, at_nodes))
 
     def slip_at_rest(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
@@ -188,33 +191,42 @@ class ContactSides:
             added[rows] += np.einsum("nk,nk->n", shape, config.wear_depth[nodes])
         return added
 
-    def smoothing_overlap(
-        self, candidates: Candidates, pairing: Pairing, smoothing: Smoothing, config: Configuration
-    ) -> Array:
-        """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length].
+    def gaps(
+        self, candidates: Candidates, pairing: Pairing, config: Configuration
+    ) -> tuple[csr_array, csr_array, Array]:
+        """Return the `relative_motion` (n, n_points) of candidates, and the gaps ``gap0 + G @ u`` of smooth surfaces.
 
-        The candidates must have facets and reference coordinates.
+        The gaps consist of their derivatives G (n, n_points * dim) [-] and gap0 (n,) [length]. With smooth surfaces, the
+        candidates must have facets and reference coordinates.
         """
-        assert candidates.facet is not None
-        assert candidates.xi is not None
-        overlap, rows = np.zeros(len(pairing.paired)), pairing.rows
-        on_secondary = candidates.facet[rows], candidates.xi[rows]
-        on_primary = pairing.facet[rows], pairing.xi[rows]
-        overlap[rows] = smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
-        return overlap
+        motion = relative_motion(candidates, pairing, len(self.points))
+        (G, gap0), added_gap = gap_rows(motion, pairing, self.points), self.added_gap(candidates, pairing, config)
+        if self.smoothing is not None:
+            rows = pairing.rows
+            on_secondary, on_primary = ((side.facet[rows], side.xi[rows]) for side in (candidates, pairing))
+            added_gap[rows] -= self.smoothing.overlap(on_secondary, on_primary, self.points + config.displacement)
+        return motion, G, gap0 + added_gap
 
-    def smoothing_slope(
-        self, candidates: Candidates, pairing: Pairing, rows: Indices, smoothing: Smoothing, config: Configuration
-    ) -> Array:
-        """Return the derivatives (n, dim - 1) of `smoothing_overlap` with respect to primary reference coordinates [length].
+    def linearised_points(
+        self, candidates: Candidates, pairing: Pairing, rows: Indices, config: Configuration, normals: object,
+        closest: bool = False,
+    ) -> Points:  # fmt: skip
+        """Return the linearised projections of the candidates with the numbers `rows` (n,) onto the primary side.
 
-        `rows` (n,) are numbers of candidates. The derivatives are zero on the straight extensions of facets.
+        They refer to smooth surfaces, if these are used. `normals` and `closest` apply to meshed primary sides, see
+        `SurfacePoints`.
         """
-        assert candidates.facet is not None
-        axes = smoothing.frames(self.points + config.displacement)
-        factor = smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
-        slope = factor * smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
-        return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
+        if isinstance(self.primary, RigidSide):
+            shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(self.points))
+            return ObstaclePoints(shapes, self.primary, self.points + config.displacement, config.pose)
+        slope, smoothing, primary = None, self.smoothing, config.deformed(self.primary, self.points)
+        if smoothing is not None:
+            axes = smoothing.frames(self.points + config.displacement)
+            factor = smoothing.height_factors(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
+            slope = factor * smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
+            if pairing.beyond is not None:  # The extensions of facets are straight.
+                slope = np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
+        return SurfacePoints(candidates, pairing, rows, primary, normals, closest, slope)
 
     def rigid_motion(self, positions: Callable[[Array], Array], config: Configuration) -> Array:
         """Return the displacements (n, dim) in the step of the obstacle points opposite to n points [length].
@@ -237,17 +249,13 @@ class ContactSides:
         first = closest_nodes[np.argmin(np.linalg.norm(positions[closest_nodes], axis=1))]
         return positions[first], normal[first]
 
-    def nodal_gap(
-        self, config: Configuration, with_clearance: bool = True, displacement: Array | None = None
-    ) -> tuple[Array, Array]:
+    def nodal_gap(self, config: Configuration, displacement: Array | None = None) -> tuple[Array, Array]:
         """Return the gaps of the secondary nodes, and the normals of the primary side opposite these nodes.
 
         Parameters
         ----------
         config : Configuration
             Positions of both sides at which the nodes are paired.
-        with_clearance : bool
-            Whether the gaps include clearances and wear.
         displacement : ndarray (n_points, dim), optional
             Displacements for which the gaps are evaluated; by default those of `config` [length].
 
@@ -260,11 +268,7 @@ class ContactSides:
         """
         nodes = self.node_candidates
         pairing = self.pair_candidates(nodes, config, max(self.projection_tolerance or 0.0, SMALL_OVERHANG))
-        G, gap0 = gap_rows(relative_motion(nodes, pairing, len(self.points)), pairing, self.points)
-        if self.smoothing is not None:
-            gap0 -= self.smoothing_overlap(nodes, pairing, self.smoothing, config)
-        if with_clearance:
-            gap0 += self.added_gap(nodes, pairing, config)
+        _, G, gap0 = self.gaps(nodes, pairing, config)
         u = config.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 

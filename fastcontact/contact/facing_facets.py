@@ -13,7 +13,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.projection import CORNER, closest_of_types
 from fastcontact.contact.surface import by_block
 from fastcontact.mesh import elements
-from fastcontact.mesh.area_vectors import area_vectors
+from fastcontact.mesh.area_vectors import area_vectors, unit_vectors
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -70,8 +70,7 @@ class OuterFacets:
             point.append((shape @ nodes).reshape(-1, self.mesh.dim))
             normal.append(area_vectors(nodes, gradient).reshape(-1, self.mesh.dim))
             facet.append(np.repeat(first + np.arange(len(facets)), len(shape)))
-        normals = np.concatenate(normal)
-        return np.concatenate(facet), np.concatenate(point), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.concatenate(facet), np.concatenate(point), unit_vectors(np.concatenate(normal))
 
     @cached_property
     def area(self) -> Array:
@@ -108,14 +107,12 @@ class OuterFacets:
         keys, facet, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.offsets):
             element = elements.get(name)
-            at_nodes = area_vectors(self.mesh.points[facets], element.gradient(element.nodes))
-            at_nodes /= np.linalg.norm(at_nodes, axis=2, keepdims=True)
+            at_nodes = unit_vectors(area_vectors(self.mesh.points[facets], element.gradient(element.nodes)))
             for ends in [(0, 0), (1, 1)] if self.mesh.dim == 2 else element.edges:
                 keys.append(np.sort(facets[:, ends], axis=1))
                 normal.append(at_nodes[:, ends].sum(axis=1))
                 facet.append(first + np.arange(len(facets)))
-        key, edge_normal, number = np.concatenate(keys), np.concatenate(normal), np.concatenate(facet)
-        edge_normal /= np.linalg.norm(edge_normal, axis=1, keepdims=True)
+        key, edge_normal, number = np.concatenate(keys), unit_vectors(np.concatenate(normal)), np.concatenate(facet)
         order = np.lexsort(key.T)
         row, next_row = order[:-1], order[1:]
         is_smooth = (key[row] == key[next_row]).all(axis=1)

@@ -2,9 +2,10 @@
 
 A node is open to the fluid if its contact pressure is at most the fluid pressure or, in the first pairing, if its gap is
 open. Open nodes of the same facet are connected. At open nodes that are connected with the source, the fluid pressure
-replaces the contact pressure. It acts on the secondary side along the normals of this side, and on the primary side along the
-normal of the gap, over the area that the secondary side covers. With finite strains, normals and areas are those of the
-deformed surface at which the bodies are linearised, and their variation enters the tangent.
+replaces the contact pressure. It acts on each side along the normals of this side and over its own area, because the areas
+that a front encloses on both sides differ unless their gap is small: the pressure on the primary side is that at the closest
+point of the secondary side. With finite strains, normals and areas are those of the deformed surfaces at which the bodies are
+linearised, and their variation enters the tangent.
 """
 
 from __future__ import annotations
@@ -12,21 +13,30 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_array, diags_array, eye_array, kron
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from fastcontact._tools.records import record, replace
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.contact.projection import SMALL_OVERHANG, DeformedSide, closest_of_types, facet_points
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of
 from fastcontact.mesh import elements
-from fastcontact.mesh.area_vectors import weighted_area_vectors
+from fastcontact.mesh.area_vectors import area_vectors, weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Mean gaps at open nodes near the edge of the contact, where facets are partly closed, may be negative by up to this fraction
 # of the facet length.
 EDGE_PENETRATION = 0.01
+# Cosine of the angle between the outward normals of both sides beyond which primary facets face away from the secondary side,
+# such as the back of a plate. Flanks of a curved body, whose normals are perpendicular, are wetted.
+FACING_AWAY = 0.5
+# Gap, as a fraction of the size of the secondary side, and deviation of the cosine between opposite normals from 1, up to
+# which the force on the secondary side acts on the primary side. Forces at a front then balance exactly. The fraction that
+# acts decreases to zero at twice these values, since an abrupt change could make geometry updates alternate.
+NARROW = 0.01
 
 
 @record
@@ -43,22 +53,105 @@ class WettedRegion:
         Matrix whose product with the area vectors at the secondary nodes is minus the nodal forces [force].
     areas : AreaVectors
         Area vectors of the secondary side.
+    primary : WettedFacets, optional
+        The wetted part of the primary side; None for rigid obstacles.
     """
 
     rows: Mask
     pressure: Array
     nodal_weights: csr_array
     areas: AreaVectors
+    primary: WettedFacets | None = None
 
     def force(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length]."""
-        return np.asarray(-(self.nodal_weights @ self.areas.with_derivative(displacement)[0]))
+        force = np.asarray(-(self.nodal_weights @ self.areas.with_derivative(displacement)[0]))
+        return force if self.primary is None else force - self.primary.with_derivative(displacement)[0]
 
     def stiffness(self, displacement: Array) -> csr_array:
         """Return the symmetric part (n_dofs, n_dofs) of minus the derivative of `force` [force / length]."""
         dim, derivative = displacement.shape[1], self.areas.with_derivative(displacement)[1]
         K = csr_array(kron(self.nodal_weights, eye_array(dim)) @ derivative)
+        K = K if self.primary is None else csr_array(K + self.primary.with_derivative(displacement)[1])
         return csr_array(0.5 * (K + K.T))
+
+
+@record
+class WettedFacets:
+    """Fluid pressure on the primary side.
+
+    Attributes
+    ----------
+    side : Surface
+        The primary side.
+    axisymmetric : bool
+    points : ndarray (n_points, dim)
+        Reference coordinates of all points [length].
+    pressure : tuple of ndarray (n_facets, n_q)
+        Fluid pressure at the points of the `fine_rule`, for each block of facets [pressure].
+    node : tuple of ndarray of int (n_facets, n_q)
+        Secondary node whose constraints transmit the force at each of these points.
+    """
+
+    side: Surface
+    axisymmetric: bool
+    points: Array
+    pressure: tuple[Array, ...]
+    node: tuple[Indices, ...]
+
+    @classmethod
+    def opposite(
+        cls, primary: Surface, areas: AreaVectors, displacement: Array, nodal: Array, carriers: Mask
+    ) -> WettedFacets:
+        """Return the part of a `primary` side that faces the wetted part of the secondary side, at a `displacement`.
+
+        `nodal` (n_nodes,) are the fluid pressures at the secondary nodes [pressure], of which the `carriers` (n_nodes,) have
+        wetted constraints.
+        """
+        side, current, pressures, nodes = areas.side, areas.points + displacement, list[Array](), list[Indices]()
+        numbers = np.flatnonzero(carriers)
+        tree = KDTree(areas.points[side.points[numbers]])
+        for block in primary.blocks:
+            element, xi = elements.get(block.element), fine_rule(block.element)[0]
+            x, shape = current[block.facets], (len(block.facets), len(xi))
+            positions = np.einsum("qk,fkd->fqd", element.shape(xi), x).reshape(-1, x.shape[2])
+            foot = closest_of_types(positions, side.node_positions(current))
+            on_side = facet_points(side, foot.facet, foot.xi)
+            vectors = area_vectors(x, element.gradient(xi)).reshape(positions.shape)
+            away = np.einsum("nd,nd->n", vectors, foot.normal) > FACING_AWAY * np.linalg.norm(vectors, axis=1)
+            faces = (foot.overhang <= SMALL_OVERHANG) & ~away
+            pressures.append(
+                np.where(faces, np.einsum("nk,nk->n", on_side.shape, nodal[on_side.local]), 0.0).reshape(shape)
+            )
+            reference = np.einsum("nk,nkd->nd", on_side.shape, areas.points[on_side.nodes])
+            nodes.append(numbers[tree.query(reference)[1]].reshape(shape))
+        return cls(primary, areas.axisymmetric, areas.points, tuple(pressures), tuple(nodes))
+
+    def by_node(self, displacement: Array, n_nodes: int) -> csr_array:
+        """Return minus the nodal forces that each secondary node transmits (n_nodes, n_dofs) [force]."""
+        dim, blocks = self.points.shape[1], list[Blocks]()
+        for block, pressure, node in zip(self.side.blocks, self.pressure, self.node, strict=True):
+            element, (xi, weights) = elements.get(block.element), fine_rule(block.element)
+            N, x = element.shape(xi), (self.points + displacement)[block.facets]
+            vectors = area_vectors(x, element.gradient(xi)) * (pressure * weights)[:, :, None]
+            if self.axisymmetric:
+                vectors *= (2.0 * np.pi * x[:, :, 0] @ N.T)[:, :, None]
+            dofs = np.repeat((block.facets[:, :, None] * dim + np.arange(dim)).reshape(len(x), -1), len(xi), axis=0)
+            forces = np.einsum("qa,fqd->fqad", N, vectors).reshape(len(dofs), 1, -1)
+            blocks.append((node.reshape(-1, 1), dofs, forces))
+        return assembled(blocks, (n_nodes, self.points.size))
+
+    def with_derivative(self, displacement: Array) -> tuple[Array, csr_array]:
+        """Return minus the nodal forces (n_points, dim) [force], and their derivative (n_dofs, n_dofs) [force / length]."""
+        dim, forces, blocks = self.points.shape[1], np.zeros_like(self.points), list[Blocks]()
+        for block, pressure in zip(self.side.blocks, self.pressure, strict=True):
+            element, (xi, weights) = elements.get(block.element), fine_rule(block.element)
+            N, dN, x = element.shape(xi), element.gradient(xi), (self.points + displacement)[block.facets]
+            by_facet, derivative = weighted_area_vectors(x, N, dN, pressure * weights, N, self.axisymmetric)
+            np.add.at(forces, block.facets, by_facet)
+            dofs = (block.facets[:, :, None] * dim + np.arange(dim)).reshape(len(x), -1)
+            blocks.append((dofs, dofs, derivative.reshape(*dofs.shape, -1)))
+        return forces, assembled(blocks, (self.points.size, self.points.size))
 
 
 @record
@@ -105,12 +198,12 @@ class AreaVectors:
 
 
 def with_fluid_pressure(
-    constraints: Constraints, config: Configuration, areas: AreaVectors, source: Mask
+    constraints: Constraints, config: Configuration, areas: AreaVectors, source: Mask, primary: Surface | None
 ) -> Constraints:
     """Return the constraints of a pair under the fluid pressure of a configuration.
 
-    The fluid enters from the nodes `source` (n_nodes,) of the secondary side. Contact pressures are those of the last
-    pairing; before the first one, closed nodes are impermeable.
+    The fluid enters from the nodes `source` (n_nodes,) of the secondary side. The `primary` side is None for obstacles.
+    Contact pressures are those of the last pairing; before the first one, closed nodes are impermeable.
     """
     if not config.fluid_pressure > 0.0:
         return constraints
@@ -118,7 +211,8 @@ def with_fluid_pressure(
     side, points = areas.side, areas.points
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
     deformation = config.linearisation_point
-    vectors = areas.with_derivative(np.zeros_like(points) if deformation is None else deformation)[0]
+    linearised_at = np.zeros_like(points) if deformation is None else deformation
+    vectors = areas.with_derivative(linearised_at)[0]
     gaps = constraints.gaps(config.displacement)
     nodal, node = constraints.nodal_field.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     if config.pressure is None:
@@ -134,10 +228,25 @@ def with_fluid_pressure(
     # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
     # much larger than the side.
     distance_to_zero = size / SINGLE_PRECISION
-    B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node])
     force = np.where(rows, config.fluid_pressure * constraints.areas, 0.0)
     force_by_node = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
-    pressure = np.where(nodes, config.fluid_pressure, 0.0)
+    pressure, total = np.where(nodes, config.fluid_pressure, 0.0), force_by_node.sum(axis=0)
+    facets, transmits = None, np.ones(len(node))
+    if primary is not None and (total > 0.0).any():
+        current = points + config.displacement
+        transmits = _narrowness(current[side.points], np.abs(nodal) / size, vectors, DeformedSide(primary, current))[
+            node
+        ]
+        field = constraints.nodal_field.pressure(force * (1.0 - transmits))
+        paired = np.bincount(node[constraints.usable], minlength=len(nodes)) > 0
+        field = np.where(nodes & _beyond(side, paired), pressure, field)
+        facets = WettedFacets.opposite(primary, areas, config.displacement, field, total > 0.0)
+    B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node], transmits)
+    if facets is not None:
+        of_total = rows / np.where(total > 0.0, total, np.inf)[node]
+        share = csr_array((of_total, (np.arange(len(node)), node)), shape=force_by_node.shape)
+        B = csr_array(B - share @ facets.by_node(linearised_at, len(nodes)))
+        B.eliminate_zeros()
     return replace(
         constraints,
         B=B,
@@ -145,15 +254,18 @@ def with_fluid_pressure(
         softness=np.where(rows, distance_to_zero / (config.fluid_pressure * constraints.areas), constraints.softness),
         equality=constraints.equality | rows,
         friction=np.where(rows, 0.0, constraints.friction),
-        wetted=WettedRegion(rows, pressure, csr_array(weights.T @ force_by_node), areas),
+        wetted=WettedRegion(rows, pressure, csr_array(weights.T @ force_by_node), areas, facets),
     )
 
 
-def _rows_along_area_vectors(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr_array, csr_array]:
+def _rows_along_area_vectors(
+    B: csr_array, rows: Mask, side: Surface, vectors: Array, transmits: Array
+) -> tuple[csr_array, csr_array]:
     """Return B (m, n_dofs) with secondary entries along area vectors in the marked `rows` (m,), and their weights.
 
     The weights (m, n_points) are those of the secondary points in these rows [-]. `vectors` (m, dim) are the area vectors of
-    the secondary `side` per area [-]. On the primary side, their component along the normal of the gap acts.
+    the secondary `side` per area [-]. On the primary side, their component along the normal of the gap
+    acts, times the fraction `transmits` (m,) [-].
     """
     (m, n_dofs), dim = B.shape, vectors.shape[1]
     entries = B.tocoo()
@@ -166,11 +278,31 @@ def _rows_along_area_vectors(B: csr_array, rows: Mask, side: Surface, vectors: A
     replaced = on_secondary & rows[row]
     values = entries.data[replaced] * normal[row[replaced], component[replaced]]
     weights = csr_array((values, (row[replaced], point[replaced])), shape=(m, n_dofs // dim))
-    area_ratio = np.where(rows, -np.einsum("md,md->m", vectors, normal), 1.0)
+    area_ratio = np.where(rows, -np.einsum("md,md->m", vectors, normal) * transmits, 1.0)
     other_entries = csr_array((entries.data * area_ratio[row] * ~replaced, (row, entries.col)), shape=B.shape)
     with_area_vectors = csr_array(other_entries + rows_of(weights, -vectors))
     with_area_vectors.eliminate_zeros()
     return with_area_vectors, weights
+
+
+def _narrowness(x: Array, relative_gap: Array, vectors: Array, primary: DeformedSide) -> Array:
+    """Return the fraction (n_nodes,) of the pressure that is transmitted to the opposite side, one in narrow gaps [-].
+
+    `x` (n_nodes, dim) are the positions of the secondary nodes [length], `relative_gap` (n_nodes,) their gaps over the size
+    of the side [-], and `vectors` (n_nodes, dim) their area vectors [-].
+    """
+    normal = closest_of_types(x, primary.surface.node_positions(primary.coordinates)).normal
+    cosine = -np.einsum("nd,nd->n", vectors, normal) / np.maximum(np.linalg.norm(vectors, axis=1), SINGLE_PRECISION)
+    ratios = relative_gap / NARROW, (1.0 - cosine) / NARROW
+    return np.asarray(np.prod([np.clip(2.0 - ratio, 0.0, 1.0) for ratio in ratios], axis=0))
+
+
+def _beyond(side: Surface, paired: Mask) -> Mask:
+    """Return the nodes (n_nodes,) without an opposite facet, given which nodes have constraints that can close.
+
+    On quadratic facets, a node may lack constraints although it has an opposite facet.
+    """
+    return np.asarray(~paired if side.order == 1 else side.node_adjacency @ paired == 0.0)
 
 
 def connected_nodes(side: Surface, source: Mask, passable: Mask) -> Mask:

@@ -18,6 +18,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.projection import CORNER, DeformedSide
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.multipoint_constraints import eliminate
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Cosine of the largest angle between directions at two adjacent nodes that belong to the same field, as along a curved rim.
@@ -107,8 +108,7 @@ def _rows_of_single_nodes(mpc_rows: csr_array, dim: int) -> tuple[Indices, Array
     np.add.at(normals, (row, column % dim), entries.data)
     nodes = csr_array((np.ones(len(row)), (row, column // dim)), shape=mpc_rows.shape)
     single = (np.diff(nodes.indptr) == 1) & normals.any(axis=1)
-    unit = normals[single] / np.linalg.norm(normals[single], axis=1, keepdims=True)
-    return nodes.indices[nodes.indptr[:-1][single]].astype(np.intp), unit
+    return nodes.indices[nodes.indptr[:-1][single]].astype(np.intp), unit_vectors(normals[single])
 
 
 def eigenspaces(tensors: Array, threshold: float) -> Array:
@@ -164,10 +164,10 @@ def direction_fields(projectors: Array, positions: Array) -> list[tuple[Array, M
         field = np.tile(axis[order][0], (len(positions), 1))
         if not (axis[order] @ axis[order][0] > 1.0 - ROUND_OFF).all():
             distance = _distances(positions, positions[seeds[order]])
-            field = _unit((distance.min(axis=1, keepdims=True) / distance) ** (1 + axis.shape[1]) @ axis[order])
+            field = unit_vectors((distance.min(axis=1, keepdims=True) / distance) ** (1 + axis.shape[1]) @ axis[order])
         field[seeds[order]] = axis[order]
         held = np.einsum("nd,nde,ne->n", field, remaining, field) >= SAME_DIRECTION**2
-        field[held] = _unit(np.einsum("nde,ne->nd", remaining[held], field[held]))
+        field[held] = unit_vectors(np.einsum("nde,ne->nd", remaining[held], field[held]))
         fields.append((field, held))
         remaining[held] = deflate(remaining[held], field[held], 0.0)
     return fields
@@ -178,11 +178,6 @@ def _distances(points: Array, other_points: Array) -> Array:
     from scipy.spatial.distance import cdist
 
     return np.maximum(cdist(points, other_points), TINY)
-
-
-def _unit(vectors: Array) -> Array:
-    """Return vectors (n, dim), normalised to unit length; zero vectors stay zero."""
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), TINY))
 
 
 def symmetry_planes(
@@ -225,7 +220,8 @@ def reflected(side: Surface, motions: HeldMotions | None, coordinates: Array, op
     """
     if motions is None or not np.isin(side.points, motions.nodes).any():
         return side
-    across = np.zeros((len(side.points), *2 * (coordinates.shape[1],)))  # projectors onto the normals of the planes
+    dim = coordinates.shape[1]
+    across = np.zeros((len(side.points), dim, dim))  # projectors onto the normals of the planes
     for axis, nodes in symmetry_planes(motions, side, coordinates, coordinates[opposite]):
         held = motions.projectors_at(side.points[nodes]) @ axis
         across[nodes] += held[:, :, None] * held[:, None]
@@ -233,7 +229,7 @@ def reflected(side: Surface, motions: HeldMotions | None, coordinates: Array, op
     nodes = np.flatnonzero(across.any(axis=(1, 2)))
     if not len(nodes):
         return side
-    reflections = np.eye(coordinates.shape[1]) - 2.0 * across[nodes]
+    reflections = np.eye(dim) - 2.0 * across[nodes]
     return replace(side, periodic_ends=(*side.periodic_ends, (nodes, nodes, reflections)))
 
 

@@ -72,7 +72,7 @@ def all_nodes_carry_pressure(element: str) -> bool:
     """
     xi, weights = fine_rule(element)
     areas = weights @ elements.get(element).shape(xi)
-    return bool(areas.min() >= 1e-6 * areas.max())
+    return bool(areas.min() >= SINGLE_PRECISION * areas.max())
 
 
 def areas_of_rule(block: FacetBlock, points: Array, axisymmetric: bool) -> tuple[Array, Array]:

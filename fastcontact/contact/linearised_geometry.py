@@ -33,6 +33,10 @@ from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import TINY
 
+# Multiplier field whose compliance couples the force vectors of integration points, and the `PressureField.axes` in which it
+# acts.
+PointCompliance = tuple[Projection, tuple[Array, Array] | None]
+
 
 class ClosingMotion:
     """Part q m of the relative motion that closes the gap, with ``q = a . o / a . m``; see `Slips`.
@@ -245,7 +249,7 @@ class LinearisedPoints:
     slip_normals : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
         Primary normals of the slips, and their derivatives with respect to reference coordinates, if they differ from the
         normals of the points [-].
-    compliance : (Projection, (ndarray, ndarray) or None), optional
+    compliance : PointCompliance, optional
         Compliance that couples the force vectors of the constraints of the pair, and its axes, see `PressureField.axes`. The
         components of elastic displacements along normals and tangents change as these rotate.
     """
@@ -260,7 +264,7 @@ class LinearisedPoints:
     slips: Slips | None = None
     rows_in_pair: tuple[Indices, int] | None = None
     slip_normals: tuple[InterpolatedNormals, Array] | None = None
-    compliance: tuple[Projection, tuple[Array, Array] | None] | None = None
+    compliance: PointCompliance | None = None
 
     def derivatives_along(self, du: Array) -> tuple[Array, Array]:
         """See `constraints.Linearised`."""

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, tangents
 from fastcontact.contact.projection import DeformedSide, facet_points
-from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import nodal_rows, rows_of, scaled, shapes_at
 from fastcontact.round_off import DIFFERENCE_STEP
 
@@ -102,7 +100,7 @@ class Variation(NamedTuple):
         return np.asarray(total, float).reshape(n_points, dim)
 
 
-class _SurfacePoints:
+class SurfacePoints:
     """Secondary points paired with a meshed side, and the variation of their projections and normals.
 
     The foot of a secondary point is the primary point that it faces.
@@ -241,7 +239,7 @@ class _SurfacePoints:
         return csr_array(0.5 * (K + K.T))
 
 
-class _ObstaclePoints:
+class ObstaclePoints:
     """Secondary points paired with a rigid obstacle, which has no nodes, and the variation of their normals.
 
     Parameters
@@ -266,7 +264,7 @@ class _ObstaclePoints:
         self._gradient[~np.isfinite(self._gradient)] = 0.0
 
     def variation(self, du: Array) -> Variation:
-        """See `_SurfacePoints.variation`; there are no reference coordinates."""
+        """See `SurfacePoints.variation`; there are no reference coordinates."""
         motion = self.motion @ du
         normal = np.einsum("nde,ne->nd", self._gradient, motion)
         foot = transverse(self.normal, motion) - self._gap * normal
@@ -274,27 +272,11 @@ class _ObstaclePoints:
         return Variation(no_weights, no_weights, no_nodes, foot, normal)
 
     def stiffness(self, force: Array) -> csr_array:
-        """See `_SurfacePoints.stiffness`."""
+        """See `SurfacePoints.stiffness`."""
         rows = [rows_of(self.motion, np.broadcast_to(axis, self.normal.shape)) for axis in np.eye(self.normal.shape[1])]
         normal_rows = [rows_of(self.motion, self._gradient[:, i]) for i in range(len(rows))]
         K = -sum(row.T @ scaled(normal_row, force) for row, normal_row in zip(rows, normal_rows, strict=True))
         return csr_array(0.5 * (K + K.T))
 
 
-Points: TypeAlias = _SurfacePoints | _ObstaclePoints
-
-
-def paired_points(
-    candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, points: Array,
-    config: Configuration, normals: object, closest: bool = False, slope: Array | None = None,
-) -> Points:  # fmt: skip
-    """Return the paired candidates with the numbers `rows` (n,), and the variation of their projections.
-
-    The pairing was computed in the configuration `config` of the mesh with the undeformed `points` (n_points, dim) [length].
-    `normals`, `closest` and `slope` apply to meshed primary sides, see `_SurfacePoints`.
-    """
-    if not isinstance(primary, RigidSide):
-        deformed = config.deformed(primary, points)
-        return _SurfacePoints(candidates, pairing, rows, deformed, normals, closest, slope)
-    shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(points))
-    return _ObstaclePoints(shapes, primary, points + config.displacement, config.pose)
+Points: TypeAlias = SurfacePoints | ObstaclePoints

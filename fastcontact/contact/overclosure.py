@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import number_pairs
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
@@ -44,11 +45,9 @@ class TabularLaw(OverclosureLaw):
     """
 
     def __init__(self, name: str, table: Sequence[Any] | Array) -> None:
-        try:
-            rows = np.array([[float(value) for value in row] for row in table]).reshape(-1, 2)
-        except (TypeError, ValueError):
-            rows = np.empty((0, 2))
-        if len(rows) < 2 or not np.isfinite(rows).all() or rows[0, 1] != 0.0 or not (np.diff(rows, axis=0) > 0.0).all():
+        rows = number_pairs(table)
+        ascending = rows is not None and np.isfinite(rows).all() and (np.diff(rows, axis=0) > 0.0).all()
+        if rows is None or not ascending or len(rows) < 2 or rows[0, 1] != 0.0:
             raise ContactError(
                 f"the penalty of contact '{name}' must be a number, or a table of overclosures and pressures that both "
                 "ascend, the first pressure zero: [(0.0, 0.0), (0.001, 5.0), (0.002, 20.0)]"

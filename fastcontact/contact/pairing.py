@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact._tools.records import record, replace
+from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
@@ -31,6 +31,7 @@ from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import rows_of
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Largest overhang, in facet lengths, at which a point is still paired with a facet end where the surface continues smoothly,
@@ -57,16 +58,17 @@ class Candidates:
         Point numbers of the k nodes of each candidate.
     shape : ndarray (n, k)
         Weight of each node, the value of its shape function [-].
-    facet : ndarray of int (n,), optional
+    facet : ndarray of int (n,)
         Number of the secondary facet on which each candidate lies; facets are numbered consecutively through all blocks.
-    xi : ndarray (n, dim - 1), optional
-        Reference coordinates of each candidate in its facet [-].
+        Empty if it is not needed.
+    xi : ndarray (n, dim - 1)
+        Reference coordinates of each candidate in its facet [-]; empty if they are not needed.
     """
 
     nodes: Numbers
     shape: Array
-    facet: Indices | None = None
-    xi: Array | None = None
+    facet: Indices = field(default_factory=np.empty(0, np.intp).copy)
+    xi: Array = field(default_factory=np.empty(0).copy)
 
     @classmethod
     def in_facets(cls, side: Surface, xi: Sequence[Array]) -> Candidates:
@@ -156,7 +158,8 @@ class Pairing:
         Candidates beyond the end of the primary surface are projected onto the extension of their facet.
         """
         assert self.primary is not None
-        feet = facet_points(self.primary, self.facet[rows], self.xi[rows])
+        of_rows = np.array_equal(rows, self.rows)
+        feet = self.feet if of_rows else facet_points(self.primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
             return feet
         return replace(feet, shape=feet.shape + np.einsum("nkj,nj->nk", feet.gradient, self.beyond[rows]))
@@ -241,7 +244,7 @@ def _round_edges(primary: DeformedSide, facet: Indices, xi: Array, mean: Array) 
     normals = interpolate(primary.facet_normals[facet], facet_points(primary.surface, facet, xi))
     weight = np.clip(1.0 - distance_from_edges(primary.surface, facet, xi) / ROUNDED_FRACTION, 0.0, 1.0)[:, None]
     normal = weight * mean + (1.0 - weight) * normals
-    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+    return unit_vectors(normal)
 
 
 def _with_overhang(pairing: Pairing, candidates: Array, primary: DeformedSide, overhangs: Mask) -> Pairing:
@@ -316,13 +319,16 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     mean = mean / length if length > LENGTH_ROUND_OFF * len(normal) else np.array([0.0, 0.0, 1.0])
     axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
     axis /= np.linalg.norm(axis)
+    if held is not None:  # otherwise the sign of the principal axes below could be round-off
+        in_plane = np.eye(3) - np.outer(mean, mean)
+        size, vectors = np.linalg.eigh(in_plane @ held.sum(axis=0) @ in_plane)
+        axis = vectors[:, -1] if size[-1] > LENGTH_ROUND_OFF * len(held) else axis
     # Rotate the axis by the rotation from the mean normal to the normal. If these are opposite, the axis stays unchanged.
     scale = 1.0 + normal @ mean
     slope = np.divide(normal @ axis, scale, out=np.zeros(len(normal)), where=scale > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)
     # Where the normal and the mean normal are opposite up to round-off, the tangent is not yet perpendicular to the normal.
-    first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    first = unit_vectors(first - np.einsum("nd,nd->n", first, normal)[:, None] * normal)
     second = np.cross(normal, first)
     if held is not None:  # the principal axis of the projector in the tangent plane
         pairs = (first, first), (first, second), (second, second)

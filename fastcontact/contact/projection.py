@@ -20,12 +20,13 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers, largest
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
-from fastcontact.contact.search.facet_tables import flat_triangles, tables
+from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import Surface, by_block, padded
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
-from fastcontact.mesh.area_vectors import area_vectors
-from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF
+from fastcontact.mesh.area_vectors import area_vectors, unit_vectors
+from fastcontact.mesh.flat_pieces import flat_triangles
+from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Adjacent facets whose normals enclose a smaller angle [degrees] approximate a smooth surface; others form a corner. The
 # value differs from the exterior angles of all regular polygons, so that round-off has no influence on their normals.
@@ -131,14 +132,14 @@ class DeformedSide:
             if nodes.shape[2] == 3:
                 normals.append(_face_normals(nodes, slopes))
             else:
-                normal = area_vectors(nodes, slopes)
-                length = np.linalg.norm(normal, axis=2, keepdims=True)  # zero if facets degenerate to points
-                normals.append(np.divide(normal, length, out=np.zeros_like(normal), where=length != 0.0))
+                normals.append(unit_vectors(area_vectors(nodes, slopes)))
         return padded(normals)
 
     @cached_property
-    def _angles(self) -> Array:
-        """Interior angles (n_facets, k) of faces at corners [radian]; 1 at other nodes, and 0 at repeated nodes."""
+    def _weights(self) -> Array:
+        """Interior angles (n_facets, k) of faces at corners [radian]; 1 at other nodes and on lines, 0 at repeated nodes."""
+        if self.coordinates.shape[1] == 2:
+            return self.surface.node_weights
         from fastcontact.contact import projection_kernels
 
         weights = []
@@ -156,15 +157,11 @@ class DeformedSide:
         weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
         """
         node, dim = self.surface.all_local.ravel(), self.coordinates.shape[1]
-        total, weights = (
-            np.empty((len(self.surface.points), dim)),
-            self.surface.node_weights if dim == 2 else self._angles,
-        )
-        for axis, component in enumerate((weights[..., None] * self.facet_normals).reshape(-1, dim).T):
+        total = np.empty((len(self.surface.points), dim))
+        for axis, component in enumerate((self._weights[..., None] * self.facet_normals).reshape(-1, dim).T):
             total[:, axis] = np.bincount(node, component, len(total))
         self.surface.add_across_ends(total)
-        length = np.linalg.norm(total, axis=1, keepdims=True)
-        return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)
+        return unit_vectors(total)
 
     def variation(self, du: Array) -> Array:
         """Return the variation (m, dim) of `nodal_normals`, computed by central differences [-].
@@ -188,7 +185,7 @@ class DeformedSide:
         """
         shape, node = self.facet_normals.shape, self.surface.all_local.ravel()
         smooth, normal = self.nodal_normals[node], self.facet_normals.reshape(-1, shape[2])
-        weight = (self.surface.node_weights if shape[2] == 2 else self._angles).ravel()
+        weight = self._weights.ravel()
         # A node lies on a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
         entries = np.flatnonzero(self.surface.node_weights)  # without repeated nodes
         deviates = np.einsum("pd,pd->p", normal[entries], smooth[entries]) < np.cos(np.radians(0.5 * self.corner))
@@ -201,7 +198,7 @@ class DeformedSide:
             at_node = by_node[start[node_at_corner] : start[node_at_corner + 1]]
             is_smooth = normal[at_node] @ normal[at_node].T >= np.cos(np.radians(self.corner)) - LENGTH_ROUND_OFF
             total = (is_smooth * weight[at_node]) @ normal[at_node]
-            smooth[at_node] = total / np.linalg.norm(total, axis=1, keepdims=True)
+            smooth[at_node] = unit_vectors(total)
         return smooth.reshape(shape)
 
 
@@ -216,8 +213,7 @@ def _face_normals(nodes: Array, slopes: Array) -> Array:
 
 def interpolate(normals: Array, points: FacetPoints) -> Array:
     """Return unit normals (n, dim) at points, interpolated between the normals (n, k, dim) at the nodes of their facets."""
-    normal = np.einsum("nk,nkd->nd", points.shape, normals)
-    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    return unit_vectors(np.einsum("nk,nkd->nd", points.shape, normals))
 
 
 def distance_from_edges(side: Surface, facet: Indices, xi: Array) -> Array:
@@ -401,4 +397,4 @@ def smooth_ends(side: Surface, normals: Array) -> Mask:
     """
     total = np.zeros((len(side.points), 2))
     np.add.at(total, side.ends, normals[:, :2])
-    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[side.ends] > 2.0 - 1e-6))
+    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[side.ends] > 2.0 - SINGLE_PRECISION))

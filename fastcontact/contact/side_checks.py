@@ -43,6 +43,7 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
     difference = other_centres[None] - centres[:, None]
     height, distance = np.einsum("ijd,id->ij", difference, normals), np.linalg.norm(difference, axis=2)
     facing = normals @ other_normals.T < 0
+    # Facets may lie slightly behind the plane of the other one, because surfaces are curved and may overlap.
     in_front = (height > -0.1 * distance) | (distance < np.minimum.outer(sizes, other_sizes))
     if not (facing & in_front).any():
         depth = -height[facing]

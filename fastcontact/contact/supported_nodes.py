@@ -87,7 +87,8 @@ def directions_without_slip(sides: ContactSides, config: Configuration) -> list[
 
 def held_on_both_sides(sides: ContactSides, config: Configuration) -> Array:
     """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""
-    held, nodes = np.zeros((len(sides.secondary.points), *2 * sides.points.shape[1:])), sides.held_nodes
+    dim, nodes = sides.points.shape[1], sides.held_nodes
+    held = np.zeros((len(sides.secondary.points), dim, dim))
     if len(nodes) and sides.held_motions is not None:
         P = sides.held_motions.projectors_at(sides.secondary.points[nodes])
         Q = _held_projections(sides, nodes, sides.held_motions, config)[1]
@@ -97,7 +98,8 @@ def held_on_both_sides(sides: ContactSides, config: Configuration) -> Array:
 
 def _held_without_motion(sides: ContactSides, config: Configuration) -> Array:
     """Return projectors (n_nodes, dim, dim) onto `directions_without_slip`, including those of complete facets."""
-    held, nodes = np.zeros((len(sides.secondary.points), *2 * sides.points.shape[1:])), sides.held_nodes
+    dim, nodes = sides.points.shape[1], sides.held_nodes
+    held = np.zeros((len(sides.secondary.points), dim, dim))
     motions, points = sides.held_motions, sides.secondary.points[nodes]
     if not len(nodes) or motions is None:
         return held
@@ -140,7 +142,8 @@ def _held_projections(
     The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
     """
     pairing = _paired_nodes(sides, nodes, config)[1]
-    held_primary = np.zeros((len(nodes), *2 * sides.points.shape[1:]))
+    dim = sides.points.shape[1]
+    held_primary = np.zeros((len(nodes), dim, dim))
     if pairing.primary is not None:
         projectors = motions.projectors_at(pairing.feet.nodes)
         held_primary[pairing.rows] = np.einsum("nk,nkde->nde", pairing.feet.shape, projectors)

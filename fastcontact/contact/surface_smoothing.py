@@ -27,7 +27,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER, closest_of_types
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
-from fastcontact.mesh.area_vectors import flat_area_vectors
+from fastcontact.mesh.area_vectors import flat_area_vectors, unit_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Factor by which the columns of a least-squares fit decrease with each degree of the polynomial. As the fit is regularised,
@@ -138,8 +138,7 @@ def frames(side: Surface, points: Array, coordinates: Array) -> Array:
 def _normals(block: FacetBlock, coordinates: Array) -> Array:
     """Return the unit normals (n_facets, dim) of the planes through the corners of facets."""
     corners = coordinates[block.facets[:, : elements.get(block.element).n_corners]]
-    normal = flat_area_vectors(corners)
-    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+    return unit_vectors(flat_area_vectors(corners))
 
 
 def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
@@ -149,8 +148,7 @@ def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
     """
     corners = coordinates[block.facets[:, : elements.get(block.element).n_corners]]
     first = corners[:, 0] - corners.mean(axis=1)
-    first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    first = unit_vectors(first - np.einsum("nd,nd->n", first, normal)[:, None] * normal)
     return np.stack([first, normal] if len(normal.T) == 2 else [first, np.cross(normal, first), normal], axis=1)
 
 
@@ -271,8 +269,8 @@ def _fit(block: FacetBlock, points: Array, neighbourhood: Array, valid: Mask, de
     corners = points[block.facets[:, : elements.get(block.element).n_corners]]
     origin, normal = corners.mean(axis=1), _normals(block, points)
     size = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
-    powers = _powers(points.shape[1] - 1, degree)
-    curvature = np.zeros((len(corners), *2 * (points.shape[1] - 1,)))
+    n_tangents = points.shape[1] - 1
+    powers, curvature = _powers(n_tangents, degree), np.zeros((len(corners), n_tangents, n_tangents))
     fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(neighbourhood, valid)
     for _ in range(1, PASSES):
         slope, curvature = fit.slope_and_curvature()
@@ -282,8 +280,7 @@ def _fit(block: FacetBlock, points: Array, neighbourhood: Array, valid: Mask, de
 
 def _tilted(axes: Array, slope: Array) -> Array:
     """Return axes (n, dim, dim), rotated by the smallest angle to the normals of surfaces with the `slope` (n, dim - 1)."""
-    normal = axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = unit_vectors(axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1]))
     twice_mean = axes[:, -1] + normal
     tilt = np.einsum("njd,nd->nj", axes[:, :-1], normal) / np.einsum("nd,nd->n", twice_mean, normal)[:, None]
     return np.concatenate([axes[:, :-1] - tilt[:, :, None] * twice_mean[:, None], normal[:, None]], axis=1)

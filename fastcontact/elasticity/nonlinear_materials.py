@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact._tools.argument_types import typed
+from fastcontact._tools.argument_types import number_pairs, typed
 from fastcontact.arrays import Array
 from fastcontact.elasticity.constitutive_kernels import INVARIANTS, OGDEN, PLASTIC
 from fastcontact.elasticity.materials import Constant, LinearElastic, check_positive
@@ -111,16 +111,14 @@ class ElasticPlastic(NonlinearElastic):
 
     def _table(self) -> tuple[tuple[float, float], ...]:
         """Return the hardening table, which begins at zero plastic strain; raise ModelError if it is not valid."""
-        pairs = () if self.hardening is None else self.hardening
-        try:
-            rows = np.array([[float(value) for value in pair] for pair in pairs]).reshape(-1, 2)
-        except (TypeError, ValueError, OverflowError):
+        rows = number_pairs(() if self.hardening is None else self.hardening)
+        if rows is None:
             is_slope = isinstance(self.hardening, float | int) and 0.0 <= self.hardening <= sys.float_info.max
             slope = self.hardening if is_slope else self.yield_stress
             raise ModelError(
                 "hardening must be pairs (equivalent plastic strain, yield stress), for example "
                 f"[(0.0, {self.yield_stress}), (0.1, {self.yield_stress + 0.1 * slope:g})] for the slope {slope:g}"
-            ) from None
+            )
         if not len(rows) or rows[0, 0] > 0.0:
             rows = np.vstack([[0.0, float(self.yield_stress)], rows])
         if not (np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0.0).all() and (rows[:, 1] > 0.0).all()):

@@ -185,16 +185,6 @@ class LoadedFactor(Loaded):
     def __init__(self, solver: FactorSolver, f: Array, unconstrained: Array) -> None:
         self._solver, self._f, self._unconstrained = solver, f, unconstrained
 
-    def solve(
-        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        """See `Loaded`."""
-        if B.shape[0] == 0:
-            return self._unconstrained, np.empty(0)
-        multiplier = solve_multipliers(self._solver.columns.delassus(B), c - B @ self._unconstrained, C)
-        return self.involved_solution(B.T @ multiplier, guess), multiplier
-
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
         return R @ self._unconstrained, self._solver.columns.delassus(R)

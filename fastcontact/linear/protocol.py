@@ -13,10 +13,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, Self, TypeAlias, runtime_checkable
 
+import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
+from fastcontact.linear.delassus import solve_multipliers
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.springs import Springs
 
@@ -92,6 +94,11 @@ class Loaded(Protocol):
         multiplier : ndarray (m,)
             Lagrange multipliers [force].
         """
+        if B.shape[0] == 0:
+            return self.full_solution(np.zeros(B.shape[1])), np.empty(0)
+        free, F = self.delassus(B)
+        multiplier = solve_multipliers(F + self.rigid_compliance(B), c - free, C)
+        return self.involved_solution(B.T @ multiplier, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """Return ``R K^-1 f`` (m,) [length] and the Delassus operator ``R K^-1 R.T`` (m, m) [length / force] for R (m, n)."""

@@ -5,6 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.arrays import Array
+from fastcontact.round_off import TINY
+
+
+def unit_vectors(vectors: Array) -> Array:
+    """Return unit vectors (..., dim) along vectors (..., dim), zero along those that vanish."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), TINY))
 
 
 def area_vectors(x: Array, dN: Array) -> Array:

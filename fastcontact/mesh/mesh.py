@@ -343,6 +343,11 @@ class Mesh(NameSuggestions):
         return self.with_groups(cells={name: np.concatenate([self.cell_groups[member] for member in members])})
 
 
+def node_at(mesh: Mesh, node: int) -> str:
+    """Return the number and the position of a node for messages."""
+    return f"point {node} at ({', '.join(f'{x:.6g}' for x in mesh.points[node])})"
+
+
 def facets_of_cells(mesh: Mesh) -> Iterator[tuple[str, AnyArray, AnyArray]]:
     """Yield the element type and the nodes (n_cells, n_nodes) of facets of solid cells, and the numbers of the cells.
 

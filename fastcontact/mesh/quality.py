@@ -10,6 +10,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.hanging_nodes import hanging_nodes, hanging_nodes_text
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import equal_rows
 
@@ -48,6 +49,9 @@ class MeshQuality:
         Number of solid cells that are degenerate or inverted, see `check_cells`.
     dim : int
         Number of coordinates of a point, 2 or 3.
+    hanging_nodes : str
+        Warning about nodes that lie on facets of their own body without belonging to them, as if the body were torn there;
+        empty if there are none.
     n_cells : dict of str to int
         Number of cells, including facets, by element type.
     """
@@ -62,6 +66,7 @@ class MeshQuality:
     n_cells: dict[str, int]
     n_bad: int
     dim: int
+    hanging_nodes: str = ""
 
     def __str__(self) -> str:
         cells = ", ".join(f"{count} {name}" for name, count in self.n_cells.items()) or "no cells"
@@ -72,6 +77,8 @@ class MeshQuality:
             f"edges {self.shortest_edge:.6g} to {self.longest_edge:.6g} [length], "
             f"worst aspect ratio {self.worst_aspect:.3g}\n"
             f"{kind} {self.measure:.9g} [length^{self.dim}]"
+            + f"\nwarning: {self.hanging_nodes}"
+            * bool(self.hanging_nodes)
         )
 
 
@@ -104,6 +111,7 @@ def quality(mesh: Mesh) -> MeshQuality:
         n_cells={name: len(block) for name, block in mesh.cells.items()},
         n_bad=sum(int((degenerate | inverted).sum()) for _, degenerate, inverted in checks),
         dim=mesh.dim,
+        hanging_nodes=hanging_nodes_text(mesh, *hanging_nodes(mesh)) if mesh.solids else "",
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +11,11 @@ import numpy as np
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ContactError, ModelError
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, node_at
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import penetration
 from fastcontact.model.ramp import Table
-from fastcontact.model.rigid_motions import FreeMotions, body_name, grouped_by_body, node_at
+from fastcontact.model.rigid_motions import FreeMotions, body_name, grouped_by_body
 from fastcontact.round_off import SINGLE_PRECISION
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ def initial_gaps(pair: Formulation) -> tuple[Array, Array]:
         shape = len(pair.secondary.points), pair.points.shape[1]
         return np.full(shape[0], np.inf), np.zeros(shape)
     undeformed = Configuration.undeformed(pair.points)
-    gap, normal = pair.nodal_gap(undeformed, with_clearance=False)
+    gap, normal = pair.nodal_gap(replace(undeformed, clearance_factor=0.0))
     if pair.options.clearance is not None or pair.options.clearance_primary is not None:
         gap = np.maximum(gap, pair.nodal_gap(undeformed)[0])
     return np.where(pair.excluded[pair.secondary.points], np.inf, gap), normal

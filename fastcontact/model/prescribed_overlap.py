@@ -106,8 +106,8 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
         # Nodes without supports are included in the total, whether they face the other side or not.
         unsupported = len(contact_nodes) - len(nodes)
         candidates = Candidates.from_nodes(nodes)
-        undeformed = Configuration.undeformed(formulation.points)
-        gap0, _, _ = _gaps(formulation, candidates, undeformed, with_clearance=False)
+        undeformed = replace(Configuration.undeformed(formulation.points), clearance_factor=0.0)
+        gap0, _, _ = _gaps(formulation, candidates, undeformed)
         overlaps = [_overlap_at(contact, formulation, candidates, gap0, supports, t) for t in supports.instants()]
         worst = max(overlaps, key=lambda overlap: overlap.depth)
         if worst.count:
@@ -152,15 +152,14 @@ def _depths(
 
 
 def _gaps(
-    formulation: Formulation, candidates: Candidates, configuration: Configuration, with_clearance: bool = True
+    formulation: Formulation, candidates: Candidates, configuration: Configuration
 ) -> tuple[Array, csr_array, Mask]:
     """Return the gaps (m,) of nodes [length], their rows (m, n_dofs), and the mask (m,) of paired nodes."""
     pairing = formulation.pair_candidates(candidates, configuration)
     motion = relative_motion(candidates, pairing, len(formulation.points))
     rows, gap = gap_rows(motion, pairing, formulation.points)
     gap = gap + rows @ configuration.displacement.ravel()
-    if with_clearance:
-        gap = gap + formulation.added_gap(candidates, pairing, configuration)
+    gap = gap + formulation.added_gap(candidates, pairing, configuration)
     return np.where(pairing.paired, gap, 0.0), rows, pairing.paired
 
 

@@ -18,7 +18,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, node_at
 from fastcontact.mesh.topology import RigidParts, bodies, rigid_parts
 from fastcontact.round_off import TINY
 
@@ -36,6 +36,8 @@ ZERO = 1e-8
 FAR = 1e3
 # Difference of amplitudes relative to the size of the model that may be due to the accuracy of a linear programme.
 SMALL_MOTION = 1e-3
+# Largest coefficient of a motion that is attributed to the tolerance of the linear programme [-].
+NO_MOTION = 1e-6
 # Number of edges of the pyramid that is circumscribed to Coulomb's cone in three dimensions. Tangential forces at its edges
 # exceed those of the cone by 8 %.
 EDGES = 8
@@ -298,11 +300,6 @@ def _joint_motions(mesh: Mesh, body_parts: RigidParts, part_motions: list[tuple[
     return _null_space((at_hinges[1:] - at_hinges[:-1])[same_node].reshape(int(same_node.sum()) * mesh.dim, width))
 
 
-def node_at(mesh: Mesh, node: int) -> str:
-    """Return the number and the position of a node for messages."""
-    return f"point {node} at ({', '.join(f'{x:.6g}' for x in mesh.points[node])})"
-
-
 def _part_name(mesh: Mesh, body_parts: RigidParts, number: int) -> str:
     """Return the name of a body, or of a part of a body with the first node at which it is connected to other parts."""
     _, body = bodies(mesh)
@@ -384,11 +381,14 @@ def mechanisms(gaps: Array, forces: Array, simple: Array) -> Array:
     free = ((changes >= -ZERO).all(axis=0) | (changes <= ZERO).all(axis=0)) & ~loaded
     if free.any():
         return simple[:, free]
-    for axis in range(k):
-        for sign in (1.0, -1.0):
-            motion = _maximiser(sign * np.eye(k)[axis], gaps, np.zeros(len(gaps)), scaled_forces, 1.0)
-            if np.abs(motion).max(initial=0.0) > 1e-6:
-                return motion[:, None]
+    closed = np.zeros(len(gaps))
+    # Each motion changes a gap, so one that closes none exists if and only if the sum of the changes can be positive.
+    if np.abs(_maximiser(gaps.sum(axis=0), gaps, closed, scaled_forces, 1.0)).max() <= NO_MOTION:
+        return np.empty((k, 0))
+    for objective in np.kron(np.eye(k), [[1.0], [-1.0]]):  # motions with few components, for messages
+        motion = _maximiser(objective, gaps, closed, scaled_forces, 1.0)
+        if np.abs(motion).max() > NO_MOTION:
+            return motion[:, None]
     return np.empty((k, 0))
 
 

@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     import pandas
 
 # In these columns of the table of steps of a contact pair, NaN stands for None.
-NAN_FOR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
+NAN_FOR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent", "stick_bounds")
 
 
 @typed(FileError)
@@ -486,10 +486,11 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     resultants: dict[str, Any] = {}
     for column in set(step.dtype.names).difference(layout.ROW_COLUMNS):
         value = step[column]
-        if column in NAN_FOR_NONE and not np.isfinite(value).all():
+        if column in NAN_FOR_NONE and np.isnan(value).any():
             value = None
+        elif column in ("radius", "stick_bounds"):
+            value = tuple(value.tolist())
         resultants[column] = value.item() if isinstance(value, np.generic) else value
-    resultants["radius"] = tuple(step["radius"].tolist())
     primary_forces: dict[str, Any] = {}
     if "primary_first" in step.dtype.names:
         table = _rows_of_step(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")

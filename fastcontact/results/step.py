@@ -153,8 +153,9 @@ class ContactResult(NameSuggestions):
         configuration or, of several such nodes, the one nearest to the origin.
     gap : ndarray (m,)
         Gap function, which includes the clearance: positive at open nodes, zero at closed nodes, and negative where a
-        penalty admits penetration. It is infinite at nodes without an opposite point, for example at the edge of a hole,
-        even if the facets around them carry pressure [length].
+        penalty admits penetration. It is infinite at nodes without an opposite point, for example at the edge of a hole or
+        where the secondary side extends beyond the primary side, even if the facets around them carry pressure: use
+        ``gap[np.isfinite(gap)].max()`` instead of ``gap.max()`` [length].
     pressure : ndarray (m,)
         Contact pressure per unit reference area, positive in compression; it is negative only in tied or bilateral contact
         under tension. Its interpolation by the shape functions of the facets integrates to the sum of the normal forces.
@@ -183,6 +184,9 @@ class ContactResult(NameSuggestions):
         Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)
         Whether each node is closed and sticks; without friction all closed nodes stick.
+    stick_bounds : (float, float), optional
+        The property `stick_radius` in 3D, where it depends on the facets [length]; None in 2D and in files of earlier
+        versions.
     dissipation : float
         Frictional work of this step [energy].
     obstacle_displacement : ndarray (dim,), optional
@@ -270,6 +274,7 @@ class ContactResult(NameSuggestions):
     primary_points: Numbers = None  # type: ignore[assignment]
     primary_force_vectors: Array = None  # type: ignore[assignment]
     obstacle_angle: float | None = None
+    stick_bounds: tuple[float, float] | None = None
     torque: float | None = None
     wear: Array | None = None
     damage: Array | None = None
@@ -356,8 +361,15 @@ class ContactResult(NameSuggestions):
 
     @property
     def stick_radius(self) -> tuple[float, float]:
-        """Distances from the middle to the outermost sticking node and to the next node [length]; NaN if no node sticks."""
-        return half_width(self.place, self.active & self.sticking, self.across)
+        """Lower and upper bound of the radius of the stick zone, in 2D of its half-width [length]; NaN if no node sticks.
+
+        They are the distances from the `middle` to the outermost sticking node and to the next node. In 3D, pairs of a
+        sticking and another node with a common facet are considered as for `radius`, so that the edge of the stick zone lies
+        between the bounds in every direction.
+        """
+        if self.stick_bounds is None:
+            return half_width(self.place, self.active & self.sticking, self.across)
+        return self.stick_bounds
 
     @property
     def across(self) -> Array:

@@ -50,7 +50,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
 
         - ``point``: number of the node;
         - ``x``, ``y`` and, in 3D, ``z``: reference coordinates [length];
-        - ``abscissa``, ``place`` and ``gap``, described for `ContactResult` [length];
+        - ``abscissa``, ``place`` and ``gap``, described for `ContactResult` [length]; the gap may be infinite;
         - ``radius``: distance from the middle of the contact, the magnitude of ``place`` [length];
         - ``pressure`` and ``multiplier`` [pressure];
         - ``force_x`` etc. [force], ``shear_x`` etc. [pressure], ``slip_x`` and ``slip_total_x`` etc. [length];

@@ -50,6 +50,8 @@ def _quantity_sentences(series: Series, quantity: str) -> Iterator[str]:
             f"The {title(quantity)} does not converge: its changes between levels do not decrease towards the finest mesh, "
             "and its error bar is meaningless. It may have no limit, or finer meshes are needed."
         )
+    if series.known_at_nodes(quantity):
+        yield f"The {title(quantity)} is only known at nodes: its error bar is half the distance between them."
     if split is None:
         return
     differences = series.from_theory(quantity)
@@ -84,10 +86,11 @@ def _comparison_with_theory(series: Series, quantity: str, split: Split) -> str:
         )
     if not series.has_model_error(quantity):
         orders = ", ".join(f"{order:.2g}" for order in series.orders(quantity)[1:])
+        reason = "change monotonically with the mesh size" if limit.converging else "converge"
         return (
-            f"{start} differs from theory by {percent(split.total)} on the finest mesh {dofs}. Its values do not change "
-            f"monotonically with the mesh size (observed orders {orders}): they do not support an extrapolation, and no "
-            "model error is stated. Compute more levels."
+            f"{start} differs from theory by {percent(split.total)} on the finest mesh {dofs}. Its values do not {reason} "
+            f"(observed orders {orders}): they do not support an extrapolation, and no model error is stated. Compute more "
+            "levels."
         )
     if split.resolved and not series.exact_theory:
         return (
@@ -129,8 +132,8 @@ def _equal_force_sentences(series: Series) -> Iterator[str]:
 TABLE_QUANTITIES = ("force", "pressure_max", "contact_radius", "von_mises_max")
 # Columns of the tables of limits.
 LIMIT_COLUMNS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
-# Mark after the error bar of a limit if the values do not converge.
-NOT_CONVERGED = " (unsettled)"
+# Marks after the error bar of a limit if the values do not converge, and if it is half the distance between nodes.
+NOT_CONVERGED, NODE_SPACING = " (unsettled)", " (node spacing)"
 
 
 def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
@@ -175,15 +178,17 @@ def _limit_entries(series: Series, quantity: str, columns: Sequence[str]) -> lis
     if limit is None:
         return ["-"] * len(columns)
     at_force = series.split_equal_force(quantity) if quantity != "force" else None
-    order = f"{limit.order:.2f}"
+    order, at_nodes = f"{limit.order:.2f}", series.known_at_nodes(quantity)
+    mark = NODE_SPACING if at_nodes else "" if limit.converging else NOT_CONVERGED
+    mesh_error = percent(split.mesh) if split else _errors(series, quantity)[-1]
     texts = {
         "limit": number(limit.value, 8),
-        "+-": number(limit.uncertainty, 2) + ("" if limit.converging else NOT_CONVERGED),
+        "+-": number(limit.uncertainty, 2) + mark,
         "order": f"{order} +- {limit.order_uncertainty:.2f}" if math.isfinite(limit.order) else "-",
         "order alone": order,
         "theory": number(series.theory.get(quantity, math.nan), 8),
         "model error": percent(split.model if split and series.has_model_error(quantity) else None),
-        "mesh error": percent(split.mesh) if split else _errors(series, quantity)[-1],
+        "mesh error": "-" if at_nodes else mesh_error,
         "at equal force": percent(at_force.model if at_force else None),
     }
     return [texts[name] for name in columns]

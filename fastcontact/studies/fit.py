@@ -26,6 +26,8 @@ from fastcontact.errors import CaseError
 from fastcontact.round_off import ROUND_OFF
 
 CONFIDENCE = 0.95
+# Largest relative range of values that count as converged even if their changes do not decrease.
+AGREEMENT = 1e-4
 # Orders over which the results are averaged.
 ORDERS = np.geomspace(0.4, 6.0, 81)
 # Median of the prior of the order, and standard deviation of its logarithm.
@@ -55,7 +57,8 @@ class Limit:
         Number of meshes in the fit.
     converging : bool
         Whether the values converge: the last change is smaller than 0.9 times the median of the earlier changes, or smaller
-        than 0.05 times the largest change. Otherwise a limit may not exist.
+        than 0.05 times the largest change, or the relative range of all values is at most 1e-4; in the last case, the
+        uncertainty is at least this range. Otherwise a limit may not exist.
     """
 
     value: float
@@ -111,13 +114,16 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     low, middle, high = _quantiles(centre, width, weight, len(value) - 2 + PRIOR_WEIGHT)
     orders = np.tile(ORDERS, len(value) - 2)
     order = float(weight @ orders)
+    decreasing = changes[-1] < max(0.9 * float(np.median(changes[:-1])), 0.05 * scale)
+    spread = float(np.ptp(value))
+    agreeing = not decreasing and spread <= AGREEMENT * np.abs(value).max()
     return Limit(
         value=float(value[-1] + scale * middle),
-        uncertainty=float(scale * max(high - middle, middle - low)),
+        uncertainty=max(float(scale * max(high - middle, middle - low)), spread if agreeing else 0.0),
         order=order,
         order_uncertainty=float(np.sqrt(weight @ (orders - order) ** 2)),
         n_levels=len(value),
-        converging=bool(changes[-1] < max(0.9 * float(np.median(changes[:-1])), 0.05 * scale)),
+        converging=bool(decreasing or agreeing),
     )
 
 

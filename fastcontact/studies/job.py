@@ -43,7 +43,7 @@ COMMON_KEYS = {
     *("file", "group", "flip", "crease"),
 }
 # Version of the results in a store, incremented when the quantities or their form change.
-SCHEMA = 5
+SCHEMA = 6
 # A function of the last step, or of the list of all steps if its argument has the name `STEPS_ARGUMENT`.
 Measure = Callable[..., float]
 # Names of quantities, or functions by the name of their quantity.
@@ -76,11 +76,13 @@ class Run:
         pair = self.pair or next(iter(last.contact), None)
         values = quantities.quantities_of_contacts(last) if case is None else quantities.measure(case, last, pair)
         values = {name: value for name, value in values.items() if np.isfinite(value)}
+        spacings = quantities.node_spacings(last, pair, values, None if case is None else case.mesh)
         values |= {name: _measured_value(name, measure, steps) for name, measure in self.measures.items()}
         return {
             "h": math.nan if case is None else quantities.mesh_size(case, pair),
             "n_dofs": last.displacement.size,
             "values": values,
+            "spacings": spacings,
             **quantities.comparison_values(case, pair, values.get("force", 0.0)),
             "profile": profile(last, pair),
             "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},

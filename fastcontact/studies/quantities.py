@@ -33,6 +33,8 @@ LABELS = {
     "pressure_error": ("error of the pressure, relative L2 norm", ""),
     "pressure_error_equal_force": ("error of the pressure at equal force, relative L2 norm", ""),
 }
+# Quantities of a contact pair that are midpoints of bounds, which are usually positions of nodes.
+BRACKETS = ("radius", "stick_radius")
 # Standard quantities that are relative errors.
 RATIOS = tuple(name for name, (_, kind) in LABELS.items() if not kind)
 
@@ -231,6 +233,38 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
     if np.abs(vertex).max() > 1.0 or abs(value - v.max()) > 0.5 * np.ptp(v):
         return None
     return value, vertex
+
+
+def node_spacings(
+    last: StepResult, pair: str | None, values: Mapping[str, float], mesh: Mesh | None
+) -> dict[str, float]:
+    """Return half the distance between neighbouring nodes [length] for each quantity that is only known at nodes.
+
+    These quantities are the midpoints of bounds that are positions of nodes, and the depth of a largest stress that is not
+    interpolated. `values` are the quantities of the pair and of the mesh, if it is known. The positions of nodes in nested
+    meshes may agree by chance, which does not mean that they have converged.
+    """
+    bounds = {f"{name}.{kind}": getattr(contact, kind) for name, contact in last.contact.items() for kind in BRACKETS}
+    if pair is not None:
+        low, high = last.contact[pair].radius
+        if values.get("contact_radius") in (low, 0.5 * (low + high), high):  # not fitted to the pressures
+            bounds["contact_radius"] = low, high
+    if mesh is not None and values.get("von_mises_max") == last.von_mises.max():
+        bounds["von_mises_depth"] = 0.0, _neighbour_distance(mesh, int(np.argmax(last.von_mises)))
+    return {name: 0.5 * (high - low) for name, (low, high) in bounds.items() if np.isfinite(high - low)}
+
+
+def _neighbour_distance(mesh: Mesh, node: int) -> float:
+    """Return the largest distance [length] between nodes along the edges at a corner, or along all edges at other nodes."""
+    distance = 0.0
+    for name, block in mesh.solids.items():
+        element = elements.get(name)
+        for cell in block[(block == node).any(axis=1)]:
+            ends = cell[np.array(element.edges)]
+            ends = ends[(ends == node).any(axis=1)] if node in ends else ends
+            lengths = np.linalg.norm(mesh.points[ends[:, 0]] - mesh.points[ends[:, 1]], axis=1)
+            distance = max(distance, float(lengths.max()) / element.order)
+    return distance
 
 
 def _depth(case: Case, pair: str, position: Array) -> float:

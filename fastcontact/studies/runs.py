@@ -7,6 +7,7 @@ import itertools
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import prod
@@ -251,11 +252,15 @@ def _theory_at_force(theory: Any, share: float, force: Limit | None) -> tuple[di
 
 
 def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
-    """Return the limit of a quantity, or None if it is known on fewer than three levels or if mesh sizes coincide."""
+    """Return the limit of a quantity, or None if it is known on fewer than three levels or if mesh sizes coincide.
+
+    The error bar of a quantity that is only known at nodes is at least half the distance between them on the finest mesh.
+    """
     values = [(level.h, level.values[quantity]) for level in levels if quantity in level.values]
     if len({h for h, _ in values}) < max(3, len(values)):
         return None
-    return fit_limit(*zip(*values, strict=True))
+    limit = fit_limit(*zip(*values, strict=True))
+    return replace(limit, uncertainty=max(limit.uncertainty, levels[-1].spacings.get(quantity, 0.0)))
 
 
 # Default refinement level of the meshes of a sweep. Mesh errors of this level are usually smaller than the trends of

@@ -89,6 +89,8 @@ class RunResult:
         Number of degrees of freedom.
     values : dict of str to float
         Quantities of interest by name, in the units of the case.
+    spacings : dict of str to float
+        Half the distance between neighbouring nodes [length], by the names of quantities that are only known at nodes.
     profile : dict
         Lists ``r`` [length] and ``pressure`` [pressure] of the secondary nodes, with the distance from the middle of the
         contact and the contact pressure.
@@ -101,6 +103,7 @@ class RunResult:
     h: float
     n_dofs: int
     values: dict[str, float]
+    spacings: dict[str, float] = field(default_factory=dict, repr=False)
     profile: dict[str, list[float]] = field(repr=False)
     seconds: float
     warnings: tuple[str, ...]
@@ -205,14 +208,18 @@ class Series:
         limit, theory = self.limits.get(quantity), self.theory.get(quantity)
         return split(self.values(quantity)[-1], limit, theory) if limit and theory else None
 
+    def known_at_nodes(self, quantity: str) -> bool:
+        """Return whether the error bar of the limit is half the distance between neighbouring nodes."""
+        return quantity in self.limits and self.limits[quantity].uncertainty == self.finest.spacings.get(quantity)
+
     def has_model_error(self, quantity: str) -> bool:
         """Return whether the model error at equal approach is known.
 
-        The theory is exact, or the values on successive meshes increase or decrease monotonically, or the model error is
-        larger than their range. Otherwise they do not support an extrapolation.
+        The theory is exact, or the values converge and either change monotonically on successive meshes or have a range
+        smaller than the model error. Otherwise they do not support an extrapolation.
         """
         split, values = self.split(quantity), np.array(self.values(quantity))
-        if split is None:
+        if split is None or not (self.exact_theory or self.limits[quantity].converging):
             return False
         values = values[np.isfinite(values)]
         changes = np.diff(values)
@@ -230,9 +237,9 @@ class Series:
         return bool(limit.converging and abs(split.model) <= max(split.uncertainty, EXACT))
 
     def split_equal_force(self, quantity: str) -> Split | None:
-        """Return the model and the mesh error relative to the theory at the limit of the force; None if unknown."""
+        """Return the model and the mesh error relative to the theory at the limit of the force; None if not converging."""
         limit, theory = self.limits.get(quantity), self.equal_force.get(quantity)
-        if not (limit and theory):
+        if not (limit and limit.converging and theory):
             return None
         # The theory is evaluated at the limit of the force, whose uncertainty adds to that of the quantity.
         error_bar = math.hypot(limit.uncertainty, self.equal_force_spread.get(quantity, 0.0))

@@ -9,8 +9,10 @@ OTHERWISE = {
         "mesh file missing", "mesh file is a text file", "mesh file is empty", "mesh file is truncated",
         "suffix of no known format", "case file missing", "case is a folder", "result file missing", "`fastcontact profile` on a mesh file",
         "`fastcontact info` on a missing file", "export of a case file", "mesh written with an unknown suffix", "broken TOML",
-        "one of several supports in single brackets", "contact pair in double brackets",
+        "one of several supports in single brackets", "first of several supports in single brackets",
+        "contact pair in double brackets", "contact pairs in single and in double brackets",
     ),
+    "no message: the comma separates two values, of which the first is used": ("decimal comma", "decimal comma in an inline table"),
     "an error that names the unknown group, without a suggestion": (
         "group of the material misspelled", "group of a support misspelled", "side of the contact misspelled",
         "probe misspelled", "pressure on an unknown group", "contact side is a point", "the file has no groups",

@@ -19,27 +19,27 @@ HEAD = """# Mistakes and their messages
 This page lists common mistakes and the messages that report them. Each message is a single line that states the cause
 and the remedy.
 
-- **Errors in the input** are reported before the analysis starts. The command line ends with exit code 1. The library
-  raises one of its [exceptions](errors.md) with the same text.
+- **Errors in the input** are reported before the analysis starts. A command ends with exit code 1. The library raises
+  one of its [exceptions](errors.md) with the same text.
 - **Doubtful input** that can be solved causes a warning, which states the size of the effect. In Python, the warning is
-  a `FastcontactWarning`. The command line shows it on the terminal. It is also stored in the log, in the summary
-  written by `--json` and in the result file (`open_results(path).warnings`).
+  a `FastcontactWarning`. Commands show it on the terminal. The log, the summary written by `--json` and the result file
+  (`open_results(path).warnings`) also contain it.
 
-The tables show messages or parts of them. Three dots stand for text that varies. The tables are generated from tests
-that make each mistake and compare the message. The last column describes a common response of other finite-element
-programs to the same mistake. The responses of individual programs differ.
+The tables show messages or parts of messages; three dots stand for text that varies. The tables are generated from
+tests that make each mistake and compare the message. The last column describes a common response of other
+finite-element programs to the same mistake. The responses of individual programs differ.
 """
 SECTIONS = (
     ("In a case file", "`fastcontact run` solves the ready-made case FORMA04 A with one change:", CASES),
     ("In a mesh file", "`fastcontact run` solves the same case with a damaged copy of its mesh:", MESHES),
     ("On the command line", "", COMMANDS),
     ("Where results are written", "", ACCIDENTS),
-    ("In calls: meshes", "", library.MESH),
-    ("In calls: materials and units", "", library.MATERIALS),
-    ("In calls: supports", "", library.SUPPORTS),
-    ("In calls: contact", "", library.CONTACT),
-    ("In calls: loads", "", library.LOADS),
-    ("In calls: ramp and options", "", [*library.RAMP, *library.OPTIONS]),
+    ("In Python: meshes", "", library.MESH),
+    ("In Python: materials and units", "", library.MATERIALS),
+    ("In Python: supports", "", library.SUPPORTS),
+    ("In Python: contact", "", library.CONTACT),
+    ("In Python: loads", "", library.LOADS),
+    ("In Python: ramp and options", "", [*library.RAMP, *library.OPTIONS]),
     ("Warnings", "In these cases the analysis runs, but its result is doubtful:", DOUBTS),
 )
 CONSEQUENCE = {name: text for text, names in OTHERWISE.items() for name in names}

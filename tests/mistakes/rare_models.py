@@ -107,6 +107,9 @@ MISTAKES = [
             r"the motion .* of obstacle 'plane' must be finite numbers"),
     Mistake("an obstacle both moved and pushed", lambda: obstacle(motion={"y": -1.0}, force={"y": -1.0}), fc.ModelError,
             r"obstacle 'plane' is both moved and pushed along y: name this component either in its motion or in its force"),
+    Mistake("an obstacle guided along an oblique direction", lambda: obstacle(force={"y": -1.0}, axes=(1.0, 1.0)), fc.ModelError,
+            r"'axes' of obstacle 'plane': obstacles are moved, pushed and guided along x or y: give 'motion' or 'force' by "
+            r"components, or rotate the points of the mesh such that the guided direction is an axis"),
     Mistake("an obstacle pushed along the radius", lambda: round_obstacle(force={"x": 1.0}), fc.ModelError,
             r"a force cannot move obstacle 'plane' along the radius x: in axisymmetry give y only"),
     Mistake("standard multipliers against an obstacle", lambda: obstacle(motion={"y": -1.0}, formulation="mortar", multipliers="standard"),

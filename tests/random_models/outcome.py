@@ -38,7 +38,7 @@ ITERATIVE = {"penetration": 1e-6, "product": 1e-6, "displaced": 1e-6}
 SAME = 1e-7
 # Forces below this part of the largest modulus times size and displacement of the model are round-off.
 NOTHING = 1e-8
-# Strain by round-off of coordinates: an interference of this part of the size of the model is none.
+# Round-off of coordinates: interferences and displacements of this part of the size of the model are none.
 ROUND_OFF = 16 * float(np.finfo(float).eps)
 
 
@@ -108,12 +108,12 @@ def said_again(
         wrong.append(f"{other.words}: {type(error).__name__}: {error}")
         return found
     apart = _without_undetermined(given.model.mesh, other.back(again.displacement) - last.displacement, last)
-    found["said again"] = float(np.abs(apart).max() / (np.abs(last.displacement).max() or 1.0))
+    largest, size = np.abs(last.displacement).max(), np.ptp(given.model.mesh.points, axis=0).max()
+    found["said again"] = float(np.abs(apart).max() / max(largest, ROUND_OFF / SAME * size))
     # Forces of round-off, of a pair that hardly touches in a model that others load, differ as they like.
     sums = [np.linalg.norm(one.force_vectors, axis=1).sum() for one in last.contact.values()]
     modulus = max(np.max(material.E) for material, _ in given.model.materials)
-    size = np.ptp(given.model.mesh.points, axis=0).max()
-    least = NOTHING * np.abs(last.displacement).max() + ROUND_OFF / SAME * size
+    least = NOTHING * largest + ROUND_OFF / SAME * size
     stiffness = modulus * (1.0 if given.model.kinematics in ("plane_strain", "plane_stress") else size)
     scale = max(*sums, np.linalg.norm(last.reaction, axis=1).sum(), least * stiffness, largest_force) or 1.0
     changes = [np.linalg.norm(again.contact[name].force @ other.Q - one.force) for name, one in last.contact.items()]

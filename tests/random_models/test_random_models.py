@@ -48,11 +48,13 @@ def test_layers_without_force_have_no_determined_position():
     check([310377])
 
 
-# Adhesion whose stiffness in compression depended on the directions of facets; laws of every kind.
+# Adhesion whose stiffness in compression depended on the directions of facets, and without loads; laws of every kind; a layer
+# with nodes that are held at both ends of a sector.
 @pytest.mark.parametrize(
     ("law", "seeds"),
     [
-        ("adhesion", [620012, 620022]),
+        ("adhesion", [620012, 620022, 630048]),
+        ("cohesion", [640036]),
         *((law, [610000, 610003]) for law in ("cohesion", "penalty", "tangential penalty", "wear", "friction ramp")),
     ],
 )

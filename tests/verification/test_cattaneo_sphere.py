@@ -135,7 +135,7 @@ def test_stick_radius(instant):
     exact = theory(instant).stick_radius
     assert measured_radii(instant)[1] == pytest.approx(exact, rel=0.01)
     contact = pressed_and_drawn()[instant]
-    assert contact.stick_radius[0] - SIZE < exact < contact.stick_radius[1] + SIZE
+    assert contact.stick_radius[0] < exact < contact.stick_radius[1]
     assert (contact.active & ~contact.sticking).any()
 
 

@@ -29,15 +29,16 @@ def wedge():
     return model
 
 
+def ring(radii, heights, divisions):
+    """Return a quarter of a ring."""
+    size = (radii[1] - radii[0], np.pi / 2, heights[1] - heights[0])
+    mesh = fc.generate.box(size, divisions, origin=(radii[0], 0.0, heights[0]))
+    r, angle, z = mesh.points.T
+    return mesh.replace(points=np.column_stack([r * np.cos(angle), r * np.sin(angle), z]))
+
+
 def gasket():
     """A quarter of a soft ring between two flanges that pressure clamps."""
-
-    def ring(radii, heights, divisions):
-        size = (radii[1] - radii[0], np.pi / 2, heights[1] - heights[0])
-        mesh = fc.generate.box(size, divisions, origin=(radii[0], 0.0, heights[0]))
-        r, angle, z = mesh.points.T
-        return mesh.replace(points=np.column_stack([r * np.cos(angle), r * np.sin(angle), z]))
-
     rings = {
         "0": ring((4, 10), (0.0, 2.0), (6, 10, 2)),
         "1": ring((5, 7), (2.0, 2.3), (3, 13, 1)),
@@ -54,12 +55,38 @@ def gasket():
     return model
 
 
+def bolt():
+    """A quarter of a bolt that clamps two plates, of which the rim of the lower one is held."""
+    parts = {
+        "SHANK": ring((0.5, 3.0), (-3.0, 11.0), (2, 6, 14)),
+        "NUT": ring((3.0, 6.0), (-3.0, 0.0), (3, 6, 3)),
+        "HEAD": ring((3.0, 6.0), (8.0, 11.0), (3, 6, 3)),
+    }
+    shape = fc.generate.merge_points(joined(parts), 1e-6)
+    shape = shape.with_facet_group("CUT", lambda x: abs(x[:, 2] - 4.0) < 1e-6, between=True)
+    plates = {"0": ring((3.5, 12.0), (0.0, 4.0), (5, 7, 2)), "1": ring((3.5, 12.0), (4.0, 8.0), (5, 8, 2))}
+    mesh = fc.generate.union(fc.generate.cut(shape, "CUT"), joined(plates))
+    model = elastic_model(mesh, "3d", E=2e5, XMAX0="z")
+    for part in (*parts, *plates):
+        supported(model, **{f"YMIN{part}": "y", f"YMAX{part}": "x"})
+    model.add_pretension("bolt", "CUT", force=1000.0)
+    model.add_contact("head", secondary="ZMINHEAD", primary="ZMAX1", friction=0.3)
+    model.add_contact("nut", secondary="ZMAXNUT", primary="ZMIN0", friction=0.3)
+    model.add_contact("plates", secondary="ZMIN1", primary="ZMAX0", friction=0.3)
+    return model
+
+
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 @pytest.mark.parametrize(
     ("model", "of_linear", "held", "force"),
     # Iterations of a linear solution of the same bodies on the springs; the load that the first pair carries along an axis.
     # Stiff springs, whose positions Newton's method sought, took 681 and 255 for plates and wedge.
-    [(lambda: plates(0.3), 15, 2, 490.0), (wedge, 11, 1, 13.5), (gasket, 19, 2, 378.0 * 10.0 * np.sin(np.pi / 18))],
+    [
+        (lambda: plates(0.3), 15, 2, 490.0),
+        (wedge, 11, 1, 13.5),
+        (gasket, 19, 2, 378.0 * 10.0 * np.sin(np.pi / 18)),
+        (bolt, 31, 2, 1000.0),
+    ],
 )
 def test_ten_linear_solutions_hold_loose_bodies(model, of_linear, held, force):
     (step,), (exact,) = (fc.solve(model(), 1, linear_solver=solver) for solver in ("amg", "direct"))

@@ -146,6 +146,36 @@ def test_fluid_round_a_disc_comes_as_far_as_the_contact_presses_less(element):
     assert abs(last.reaction[mesh.points_of("A1B1"), 1].sum() + contact.force[1]) < 1e-9 * abs(contact.force[1])
 
 
+@pytest.mark.parametrize("strain", ["small", "finite"])
+def test_the_force_of_a_fluid_does_not_depend_on_the_choice_of_the_secondary_side(strain):
+    """A half disc of height 1 on a plate, wetted on its left as far as the contact: statics demands the pressure times it."""
+    disc = fc.generate.mirrored(fc.generate.quarter_disc("tri6", R=1.0, size=0.4, contact_size=0.2), "y")
+    disc = fc.generate.renamed(disc, {"CONT1": "ARC", "D1B1": "ARC"})
+    disc = fc.generate.merge_points(fc.generate.union(disc, fc.generate.mirrored(disc, "x")), 1e-6)
+    disc = disc.with_facet_group("CUT", lambda x: x[:, 1] > 1.0 - 1e-9)
+    disc = disc.with_facet_group("EDGE", lambda x: (x[:, 0] < -0.95) & (x[:, 1] < 1.0))
+    plate = fc.generate.renamed(fc.generate.block((4.0, 1.0), (24, 4), "quad4", (-2.0, -1.0)), lambda g: f"PLATE {g}")
+    on_disc, on_plate, pressure, push = [], [], 1.5, 0.02
+    for secondary, source in (("ARC", "EDGE"), ("PLATE TOP", "PLATE TOP_LEFT")):
+        model = fc.Model(fc.generate.union(disc, plate), "plane_strain", strain=strain)
+        model.add_material(fc.LinearElastic(E=100.0, nu=0.3) if strain == "small" else fc.NeoHookean(E=100.0, nu=0.3))
+        supported(model, **{"PLATE BOTTOM": "xy"})
+        model.prescribe("CUT", x=0.0, y=-push, ramp=HELD)
+        primary = {"ARC": "PLATE TOP", "PLATE TOP": "ARC"}[secondary]
+        model.add_contact("seal", secondary=secondary, primary=primary, search_distance=4.0)
+        model.add_fluid_pressure("seal", pressure, source=source, ramp=((0, 0), (1, 0), (2, 1)))
+        last = fc.solve(model, fc.Ramp((0.5, 1.0, 2.0), ((0, 0), (2, 2))))[-1]
+        seal = last.contact["seal"]
+        forces = [seal.force, seal.primary_force_vectors.sum(axis=0)]
+        on_disc.append(forces[secondary != "ARC"])
+        on_plate.append(forces[secondary == "ARC"])
+        assert np.abs(last.reaction[model.mesh.points_of("CUT")].sum(axis=0) + on_disc[-1]).max() < 1e-9
+    for force in on_disc:
+        assert force[0] == pytest.approx(pressure * (1.0 - (push if strain == "finite" else 0.0)), rel=0.02)
+    for forces, error in ((on_disc, 0.04), (on_plate, 0.01)):
+        assert forces[0] == pytest.approx(forces[1], abs=error * abs(forces[1][1]))
+
+
 def test_facets_that_two_fluids_press_on_are_told():
     model = elastic_model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_strain", E=1.0, nu=0.3, TOP="xy")
     for name, height in (("near", -0.1), ("far", -0.2)):

@@ -14,7 +14,6 @@ from fastcontact.analysis.modal.held_contact import contact_stiffness
 from fastcontact.cli import main
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.contact.linearised_projections import paired_points
 from fastcontact.contact.pairing import Candidates
 from fastcontact.mesh import elements
 
@@ -380,7 +379,7 @@ def test_contact_stiffness_in_space_is_minus_the_second_difference_of_gaps(eleme
     def faced_at(u):
         moved = replace(config, displacement=u)
         pairing = pair.pair_candidates(candidates, moved)
-        return paired_points(candidates, pairing, rows, pair.primary, mesh.points, moved, "facet")
+        return pair.linearised_points(candidates, pairing, rows, moved, "facet")
 
     points = [faced_at(factor * du) for factor in (-1.0, 0.0, 1.0)]
     before, at_rest, after = (force @ np.einsum("nd,nd->n", p.offset, p.normal) for p in points)

@@ -255,8 +255,10 @@ def fitted(sectors, cells, element, **options):
     return fc.solve(model, 1)[-1].contact["fit"]
 
 
+LAYER = {"cohesion": {"strength": 1e3, "energy": 1e3, "stiffness": 1e6}, "clearance_ramp": ((0.0, 0.0), (1.0, 1.0))}
 FITS = [
     (10, (5, 3), "quad8", {}),
+    (10, (5, 3), "quad8", LAYER),
     (10, (12, 12), "quad4", {}),
     (10, (12, 12), "quad4", {"penalty": 1e5}),
     (10, (3, 5), "quad8", {"formulation": "node_to_segment"}),
@@ -265,7 +267,7 @@ FITS = [
 
 
 @pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*facets", "ignore:.*sag")
-@pytest.mark.parametrize(("sectors", "cells", "element", "options"), first_of(2, FITS))
+@pytest.mark.parametrize(("sectors", "cells", "element", "options"), first_of(3, FITS))
 def test_a_closed_contact_at_the_ends_of_a_sector_is_that_inside_of_a_larger_one(sectors, cells, element, options):
     """Both nodes of a place have one condition: the split of their forces was round-off, and the geometry did not converge.
 

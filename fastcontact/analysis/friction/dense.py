@@ -254,6 +254,7 @@ def _dense_solution(A: Array, right: Array) -> Array:
     """Return the solution of ``A x = right``, or the least-squares solution of minimum norm if A is nearly singular."""
     try:
         solution = np.linalg.solve(A, right)
+        # If A is nearly singular, the solution is so large that its round-off shows in the residual.
         if np.abs(A @ solution - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):
             return np.asarray(solution)
     except np.linalg.LinAlgError:

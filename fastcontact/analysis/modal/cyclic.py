@@ -209,6 +209,7 @@ def complex_eigenpairs(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tu
     Z = _complex(vectors)
     small_K, small_M = (Z.conj().T @ _complex(matrix @ vectors) for matrix in (K, M))
     masses, basis = np.linalg.eigh(small_M)
+    # Twins are linearly dependent, so that the mass of their difference is round-off.
     positive = masses > 1e-8 * masses.max()
     basis = basis[:, positive] / np.sqrt(masses[positive])
     values, eigenvectors = np.linalg.eigh(basis.conj().T @ small_K @ basis)

@@ -20,7 +20,6 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.integration import areas_of_rule, fine_rule
-from fastcontact.contact.linearised_projections import paired_points
 from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.tied import TiedPair, moments_of, split_rows
 from fastcontact.errors import ModelError
@@ -202,5 +201,4 @@ def _pair_stiffness(pair: Formulation, step: StepResult, name: str, finite: bool
     pairing = pair.pair_candidates(candidates, configuration)
     rows = np.flatnonzero(pairing.paired & (force != 0.0))
     normals = "facet" if pair.normals == "secondary" else pair.normals
-    points = paired_points(candidates, pairing, rows, pair.primary, pair.points, configuration, normals)
-    return points.stiffness(force[rows])
+    return pair.linearised_points(candidates, pairing, rows, configuration, normals).stiffness(force[rows])

@@ -44,7 +44,8 @@ class Deck:
         First line of ``*HEADING``, or the name of the file without suffix.
     model : Model
         Model of the deck. Contact pairs are named ``SECONDARY/PRIMARY``, and groups have the names of the sets and
-        surfaces of the deck. Plane models have unit thickness.
+        surfaces of the deck. Plane models have unit thickness, and supports on local axes or with a limited period are
+        multi-point constraints. Results of `fastcontact.solve` refer to this model, and `finished` converts them.
     ramp : Ramp
         Load steps. Step k of the deck ends at load factor k.
     criteria : Criteria

@@ -17,6 +17,7 @@ from fastcontact.contact.projection import CORNER, DeformedSide, closest
 from fastcontact.contact.surface import FacetBlock, Surface, by_block
 from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Largest reference coordinate at which a facet is cut where the primary side ends. If the cut is nearer to the end of the
@@ -43,7 +44,7 @@ def line_points(
     """
     n = len(block.facets)
     ends = np.tile(np.arange(n), 2), np.repeat([-1.0, 1.0], n)
-    cuts = ends, _opposite_nodes(block, primary), borders, _opposite_ends(block, primary, tolerance)
+    cuts = ends, _opposite_nodes(block, primary), borders, opposite_ends(block, primary, tolerance)
     facet, xi = map(np.concatenate, zip(*cuts, strict=True))
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
@@ -66,10 +67,10 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     """Return the unit normals (n, 2) of a block at integration points, for nodal `coordinates` (n_points, 2)."""
     gradient = elements.get(block.element).gradient(points.xi[:, None])[:, :, 0]
     tangent = np.einsum("nk,nkd->nd", gradient, coordinates[block.facets[points.facet]])
-    return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
+    return unit_vectors(np.column_stack([tangent[:, 1], -tangent[:, 0]]))
 
 
-def _opposite_nodes(block: FacetBlock, deformed_primary: DeformedSide) -> tuple[Indices, Array]:
+def _opposite_nodes(block: FacetBlock, primary: DeformedSide) -> tuple[Indices, Array]:
     """Return the points of a block opposite the ends of primary facets, as facets and reference coordinates.
 
     Where two primary facets meet, the opposite point lies on the bisector of the angle between them, at which the closest
@@ -77,15 +78,15 @@ def _opposite_nodes(block: FacetBlock, deformed_primary: DeformedSide) -> tuple[
     side, near which points do not face the flank. It is unsuitable elsewhere: at a concave corner with a gap or an
     interference, the closest point jumps from one facet to the next as the bodies move.
     """
-    primary, deformed, normals = deformed_primary.surface, deformed_primary.coordinates, deformed_primary.nodal_normals
-    ends, first = np.unique(primary.ends, return_index=True)
-    position, normal = deformed[primary.points[ends]], normals[ends]
+    side, deformed, normals = primary.surface, primary.coordinates, primary.nodal_normals
+    ends, first = np.unique(side.ends, return_index=True)
+    position, normal = deformed[side.points[ends]], normals[ends]
     opposite = closest(position, deformed[block.facets])
     xi_0 = opposite.xi[:, 0]
-    has_two_facets = primary.inner_ends.ravel()[first]
-    cosine = np.ones(len(primary.points))  # between the normals of facets and of nodes, small at corners
-    deviation = np.einsum("fad,fad->fa", deformed_primary.facet_normals, normals[primary.all_local])
-    np.minimum.at(cosine, primary.all_local, np.where(primary.node_weights > 0.0, deviation, 1.0))
+    has_two_facets = side.inner_ends.ravel()[first]
+    cosine = np.ones(len(side.points))  # between the normals of facets and of nodes, small at corners
+    deviation = np.einsum("fad,fad->fa", primary.facet_normals, normals[side.all_local])
+    np.minimum.at(cosine, side.all_local, np.where(side.node_weights > 0.0, deviation, 1.0))
     smooth = has_two_facets & ~(cosine < np.cos(np.radians(0.5 * CORNER)))[ends]
     in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < LARGEST_CUT) & ~smooth)
     inner = np.flatnonzero(has_two_facets)
@@ -102,7 +103,7 @@ def _signed_distances(points: Array, origin: Array, normal: Array) -> Array:
     return np.asarray(offset[..., 0] * normal[..., None, 1] - offset[..., 1] * normal[..., None, 0])
 
 
-def _opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> tuple[Indices, Array]:
+def opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> tuple[Indices, Array]:
     """Return the points of a block on the normals at the ends of the primary side, as facets and reference coordinates."""
     side, deformed = primary.surface, primary.coordinates
     # A tolerance of the order of round-off does not extend the side, because the cut would leave a sliver of this width.
@@ -123,11 +124,6 @@ def _opposite_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -
     facet, xi = np.concatenate(facets), np.concatenate(coordinates)
     is_inside = np.abs(xi) < LARGEST_CUT
     return facet[is_inside], xi[is_inside]
-
-
-def facets_at_ends(block: FacetBlock, primary: DeformedSide, tolerance: float) -> Indices:
-    """Return the facets of a block inside which the primary side, or the side of one of several bodies, ends."""
-    return _opposite_ends(block, primary, tolerance)[0]
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:
@@ -169,7 +165,7 @@ def line_overlap(
     smoothing : Smoothing or None
         The smooth surfaces that the facets approximate; None if gaps are measured between the facets.
     """
-    deformed, primary_side = primary.coordinates, primary.surface
+    deformed, side = primary.coordinates, primary.surface
     masses, couplings, gap_reductions, overlap_points = [], [], [], []
     for block, offset in zip(secondary.blocks, secondary.offsets):
         n, k = block.facets.shape
@@ -193,8 +189,8 @@ def line_overlap(
             np.add.at(gap_reduction, points.facet, points.shape[:, :, None] * vectors)
         gap_reductions.append(gap_reduction)
         covered = np.flatnonzero(area > 0)
-        rows_of_blocks = by_block(pairing.facet[covered], primary_side.sizes)
-        for primary_block, (positions, primary_facet) in zip(primary_side.blocks, rows_of_blocks, strict=True):
+        rows_of_blocks = by_block(pairing.facet[covered], side.sizes)
+        for primary_block, (positions, primary_facet) in zip(side.blocks, rows_of_blocks, strict=True):
             rows = covered[positions]
             shape = elements.get(primary_block.element).shape(pairing.xi[rows])
             products = area[rows, None, None] * points.shape[rows, :, None] * shape[:, None, :]

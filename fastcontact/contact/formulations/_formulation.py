@@ -15,15 +15,15 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Constraints, Linearised, MultiplierCompliance
+from fastcontact.contact.constraints import Constraints, Linearised
 from fastcontact.contact.contact_sides import ContactSides
 from fastcontact.contact.held_motions import eigenspaces, without_complete_facets
-from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, Slips
-from fastcontact.contact.linearised_projections import InterpolatedNormals, paired_points
+from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, PointCompliance, Slips
+from fastcontact.contact.linearised_projections import InterpolatedNormals
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
-from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, normals, pair, relative_motion, tangents
+from fastcontact.contact.pairing import Candidates, Pairing, normals, pair, tangents
 from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.supported_nodes import held_on_both_sides
 from fastcontact.contact.surface import Surface
@@ -82,6 +82,9 @@ class Formulation(ContactSides, ABC):
     allows_obstacles: ClassVar[bool] = True
     # Whether each node has one gap, which is weighted over the adjacent facets.
     weighs_gaps: ClassVar[bool] = False
+    # Whether gaps between bodies are linearised at the mean of the displacements at which the sides were paired and of the
+    # solution, which reduces the error of a Newton step. Otherwise, they are linearised at the former.
+    linearised_at_mean: ClassVar[bool] = False
 
     @property
     def eliminable(self) -> bool:
@@ -158,7 +161,9 @@ class Formulation(ContactSides, ABC):
             from fastcontact.contact.fluid_pressure import AreaVectors, with_fluid_pressure
 
             areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
-            constraints = with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
+            source, primary = self.options.source[self.secondary.points], self.primary
+            facets = primary if isinstance(primary, Surface) else None
+            constraints = with_fluid_pressure(constraints, config, areas, source, facets)
         return constraints if config.wear is None else config.wear.added_to(constraints)
 
     def _with_penalties(self, constraints: Constraints, config: Configuration) -> Constraints:
@@ -231,18 +236,13 @@ class Formulation(ContactSides, ABC):
         return np.asarray(values[nearest(known_positions, positions)[1]])
 
     def assembled(
-        self, candidates: Candidates, pairing: Pairing, compliance: MultiplierCompliance | None, config: Configuration
+        self, candidates: Candidates, pairing: Pairing, compliance: PointCompliance | None, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired candidates, including tangents if `has_tangents`.
 
-        The `compliance`, if any, is `Constraints.compliance`.
+        The `compliance`, if any, is that of the multiplier field of the candidates.
         """
-        motion = relative_motion(candidates, pairing, len(self.points))
-        B, gap0 = gap_rows(motion, pairing, self.points)
-        added_gap = self.added_gap(candidates, pairing, config)
-        if self.smoothing is not None:
-            added_gap -= self.smoothing_overlap(candidates, pairing, self.smoothing, config)
-        gap0 += added_gap
+        motion, B, gap0 = self.gaps(candidates, pairing, config)
         directions, options = tuple[Array, ...](), dict[str, Any]()
         if self.has_tangents:
             projectors = None
@@ -256,40 +256,32 @@ class Formulation(ContactSides, ABC):
             rows = tuple(map(partial(rows_of, motion), slip_axes))
             options = {"tangents": rows, "directions": directions, "friction": friction, "slip0": slip0}
         if self.normals != "secondary":  # whose derivatives are not implemented
-            options["geometry"] = partial(self._linearised_points, candidates, pairing, config, directions)
-        return Constraints(B, gap0, candidates.positions(self.points), compliance, **options)
-
-    @property
-    def linearised_at_mean(self) -> bool:
-        """Whether gaps are linearised at the mean of the displacements at which the sides were paired and of the solution.
-
-        This reduces the error of a Newton step. Otherwise, they are linearised at the former.
-        """
-        return False
+            options["geometry"] = partial(self._linearised_points, candidates, pairing, config, directions, compliance)
+        return Constraints(B, gap0, candidates.positions(self.points), compliance and compliance[0], **options)
 
     def _linearised_points(
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array],
-        multiplier: Array, tangential: Array, displacement: Array,
+        compliance: PointCompliance | None, multiplier: Array, tangential: Array, displacement: Array,
     ) -> Linearised:  # fmt: skip
         """Return the linearised geometry of paired candidates, including slips along the k tangents `directions` (n, dim).
+
+        With friction, the `compliance` of a multiplier field couples force vectors, whose directions vary.
 
         The last three arguments are those of `Geometry`.
         """
         rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
-        if self.linearised_at_mean:
+        at_mean = self.linearised_at_mean and isinstance(self.primary, Surface)
+        if at_mean:
             config = replace(config, displacement=0.5 * (config.displacement + displacement))
             pairing = self.pair_candidates(candidates, config, np.inf)
-        slope = (
-            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
-        )
-        options = self.primary, self.points, config, self.normals
-        points = paired_points(candidates, pairing, rows, *options, slope=slope)
-        if self.linearised_at_mean:
+        points = self.linearised_points(candidates, pairing, rows, config, self.normals)
+        if at_mean:
             points.offset = points.offset + points.motion @ (displacement - config.displacement)
         arguments = self.secondary, points, None, points.normal, multiplier[rows]
         linearised = LinearisedPoints(*arguments, rows_in_pair=(rows, len(multiplier)))
         if not directions:
             return linearised
+        linearised = replace(linearised, compliance=compliance)
         moved = replace(config, displacement=displacement)
         slips = self._load_step_slips(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
         if not isinstance(self.primary, Surface) or self.slip != "symmetric":

@@ -27,7 +27,8 @@ at least as many points with an area as nodes. Integrals are taken over the unde
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -36,14 +37,12 @@ from scipy.sparse.linalg import splu
 from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Constraints, Geometry, Linearised, NodalField
+from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import nodes_with_area
-from fastcontact.contact.linearised_geometry import LinearisedPoints
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.supported_nodes import directions_without_slip, nodes_with_prescribed_gap
-from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -216,6 +215,9 @@ class PressureFieldFormulation(Formulation):
 
     augmentation: float = 1.0
 
+    # The error of a Newton step is a tenth of that without it.
+    linearised_at_mean: ClassVar[bool] = True
+
     @property
     def eliminable(self) -> bool:
         """Whether iterative solvers can eliminate closed constraints; see `Formulation`.
@@ -223,11 +225,6 @@ class PressureFieldFormulation(Formulation):
         In 3D without friction they can eliminate the values of the field, which friction would couple in all directions.
         """
         return self.points.shape[1] == 3 and not self.friction
-
-    @property
-    def linearised_at_mean(self) -> bool:
-        """See `Formulation`; the error of a Newton step is a tenth of that without it."""
-        return isinstance(self.primary, Surface)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -276,17 +273,14 @@ class PressureFieldFormulation(Formulation):
         self, candidates: Candidates, pairing: Pairing, field: PressureField, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired integration points, with the compliance C of the pressure field."""
-        projection = field.projection
-        constraints = self.assembled(candidates, pairing, projection, config)
-        directions, rotation = constraints.directions, self.options.sector_rotation
-        if constraints.tangents and rotation is not None:
-            axes = rotation.axes(constraints.positions), rotation.axes(self.points[self.secondary.points])
+        projection, rotation = field.projection, self.options.sector_rotation
+        if self.has_tangents and rotation is not None:
+            axes = rotation.axes(candidates.positions(self.points)), rotation.axes(self.points[self.secondary.points])
             field = replace(field, axes=axes)
-            directions = tuple(np.einsum("mde,md->me", axes[0], t) for t in directions)
-        if constraints.tangents and constraints.geometry is not None:
-            geometry = partial(_with_compliance, constraints.geometry, projection, field.axes)
-            constraints = replace(constraints, geometry=geometry)
-        Z = np.empty(0)
+        constraints = self.assembled(candidates, pairing, (projection, field.axes), config)
+        directions, Z = constraints.directions, np.empty(0)
+        if field.axes is not None:
+            directions = tuple(np.einsum("mde,md->me", field.axes[0], t) for t in directions)
         if self.friction and len(self.held_nodes):
             Z = self._compliance_at_supports(field, constraints, directions, config)
         areas = np.where(projection.areas > 0, projection.areas, np.inf)
@@ -318,17 +312,3 @@ class PressureFieldFormulation(Formulation):
                 factor[0, :, pressure > LARGEST_PRESSURE_COMPONENT * constraints.friction.max() * shear] = 0.0
                 factors.append(factor)
         return np.concatenate(factors, axis=2) if factors else np.empty(0)
-
-
-def _with_compliance(
-    geometry: Geometry, projection: Projection, axes: tuple[Array, Array] | None, multiplier: Array, tangential: Array,
-    displacement: Array,
-) -> Linearised:  # fmt: skip
-    """Return the linearised geometry of constraints whose force vectors are coupled by the compliance of a multiplier field.
-
-    `geometry` is the geometry without compliance, `projection` the multiplier field, and `axes` its `PressureField.axes`.
-    The last three arguments are those of `Geometry`.
-    """
-    linearised = geometry(multiplier, tangential, displacement)
-    assert isinstance(linearised, LinearisedPoints)
-    return replace(linearised, compliance=(projection, axes))

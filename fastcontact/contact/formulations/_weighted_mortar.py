@@ -29,14 +29,14 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Linearised, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
-from fastcontact.contact.formulations._cut_lines import facets_at_ends, line_overlap
+from fastcontact.contact.formulations._cut_lines import line_overlap, opposite_ends
 from fastcontact.contact.formulations._dual_basis import SMALL_FRACTION, SMALL_INTEGRAL, dual_functions, positive_basis
 from fastcontact.contact.formulations._finite_differences import FiniteDifferences
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NEGLIGIBLE_AREA, areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import ClosingMotion, LinearisedPoints, Substitution
-from fastcontact.contact.linearised_projections import Points, paired_points
+from fastcontact.contact.linearised_projections import Points
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import FACING, Candidates, Normals, pair, tangents
 from fastcontact.contact.projection import DeformedSide
@@ -46,7 +46,8 @@ from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements
-from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
+from fastcontact.mesh.area_vectors import unit_vectors
+from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 MULTIPLIERS = ("standard", "dual")
 
@@ -302,7 +303,7 @@ class WeightedMortar(Formulation):
         if isinstance(self.primary, RigidSide) or self.points.shape[1] == 3:
             return isinstance(self.primary, Surface)
         primary, tolerance = config.deformed(self.primary, self.points), self.projection_tolerance or 0.0
-        ends = ((block.local, facets_at_ends(block, primary, tolerance)) for block in self.secondary.blocks)
+        ends = ((block.local, opposite_ends(block, primary, tolerance)[0]) for block in self.secondary.blocks)
         return any(multiplier[local[facets]].any() for local, facets in ends)
 
     def _linearised_points_of_overlap(
@@ -337,18 +338,14 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), primary, LARGEST_OVERHANG, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        slope = (
-            None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, self.smoothing, config)
-        )
-        options = self.primary, self.points, config
-        points = paired_points(candidates, pairing, rows, *options, normals, True, slope)
+        points = self.linearised_points(candidates, pairing, rows, config, normals, closest=True)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
         weights, *substitute_weights = (scaled(matrix, 1.0 / means.weight) for matrix in integrals)
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: DeformedSide | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
             all_nodes = np.arange(len(self.secondary.points))
-            separate_normals = paired_points(self.node_candidates, pairing, all_nodes, *options, self.normals)
+            separate_normals = self.linearised_points(self.node_candidates, pairing, all_nodes, config, self.normals)
         elif self.normals == "secondary":
             separate_normals = config.deformed(self.secondary, self.points)
         linearised = points, weights, means.normal, multiplier, mean, separate_normals
@@ -381,8 +378,7 @@ class WeightedMortar(Formulation):
         """
         direction = normal
         if not isinstance(self.primary, RigidSide):
-            direction = normal - config.deformed(self.secondary, self.points).nodal_normals
-            direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
+            direction = unit_vectors(normal - config.deformed(self.secondary, self.points).nodal_normals)
         cosine = np.einsum("nd,nd->n", normal, direction)
         gap = np.where(constraints.usable & (cosine > 0.0), constraints.gaps(config.start), 0.0)
         return gap / np.where(cosine > 0.0, cosine, 1.0), direction
@@ -399,7 +395,8 @@ class WeightedMortar(Formulation):
         """
         coverage, D, _, weight, motion, *_ = means
         rows, substitutions = [rows_of(motion, direction) for direction in directions], []
-        held = np.zeros((len(weight), *2 * self.points.shape[1:]))
+        dim = self.points.shape[1]
+        held = np.zeros((len(weight), dim, dim))
         for axis, nodes in without_slip:
             if not (nodes & coverage.with_gap).any():
                 continue
@@ -522,8 +519,7 @@ class WeightedMortar(Formulation):
         length, overall = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)
         if np.linalg.norm(overall) <= LENGTH_ROUND_OFF * length.sum():
             overall = np.eye(len(overall))[-1]
-        mean = np.where(length > 0.0, mean, overall)
-        return mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        return unit_vectors(np.where(length > 0.0, mean, overall))
 
     def _clearance(self, D: csr_array, M: csr_array, weight: Array) -> Array:
         """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""

@@ -99,8 +99,6 @@ class Continuous(PressureFieldFormulation):
         if not at_corner.any():
             return points, areas
         nodes, nodal_areas = self._points_of(_at_nodes)
-        assert points.facet is not None
-        assert nodes.facet is not None
         selected = np.concatenate([~at_corner[points.facet], at_corner[nodes.facet]])
         arrays = [(getattr(points, f.name), getattr(nodes, f.name)) for f in fields(Candidates)]
         *merged, areas = (np.concatenate(both)[selected] for both in [*arrays, (areas, nodal_areas)])

@@ -77,8 +77,6 @@ class NodeToSegment(Formulation):
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
             normal = config.deformed(self.primary, self.points).nodal_normals[closest]
-        assert nodes.facet is not None
-        assert nodes.xi is not None
         return replace(pairing, facet=nodes.facet[closest], xi=nodes.xi[closest], normal=normal, beyond=None)
 
     def unilateral(self, config: Configuration) -> Constraints:

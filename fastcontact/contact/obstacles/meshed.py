@@ -20,6 +20,7 @@ from fastcontact.contact.projection import (
     interpolate,
 )
 from fastcontact.errors import ContactError
+from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
@@ -109,7 +110,7 @@ class MeshedSurface:
         outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
         normal = averaged if self.crease else np.where(on_edge[:, None], averaged, closest.normal)
-        pseudonormal /= np.linalg.norm(pseudonormal, axis=1, keepdims=True)
+        pseudonormal = unit_vectors(pseudonormal)
         # Next to a sharp edge the normal has the direction from the closest point to the point, not that of a facet normal.
         sharp = np.einsum("nd,nd->n", pseudonormal, averaged) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
         is_corrected = on_edge & sharp & ~is_touching

@@ -1,4 +1,4 @@
-"""Constants of the element types of facets in 3D: sides, polynomials, flat triangles, and bounds on the curvature.
+"""Constants of the element types of facets in 3D: sides, polynomials, and bounds on the curvature.
 
 A facet of m nodes is a polynomial of its reference coordinates s and t, with the first m of the terms 1, s, t, st, s^2, t^2,
 s^2 t, s t^2, s^2 t^2.
@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_triangles
 
 _NAMES = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}
 _TRIANGLE_SIDES = np.array([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
@@ -24,14 +25,6 @@ _POWERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [0, 2], [2, 1], [1, 
 # norm), for s and t up to 1.
 _GRADIENT_CHANGES = np.sqrt([0, 0, 0, 2, 4, 4, 5, 5, 8])
 _SECOND_DERIVATIVES = np.array([0, 0, 0, 1, 2, 2, 1 + 5**0.5, 1 + 5**0.5, 6])
-# Flat triangles between the nodes, by number of nodes.
-_FLAT = {
-    3: [[0, 1, 2]],
-    4: [[0, 1, 2], [0, 2, 3]],
-    6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
-    8: [[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 7], [5, 6, 7]],
-    9: [[0, 4, 8], [0, 8, 7], [4, 1, 8], [1, 5, 8], [5, 2, 8], [2, 6, 8], [6, 3, 8], [3, 7, 8]],
-}
 
 
 class Tables(NamedTuple):
@@ -57,11 +50,6 @@ def tables(n_nodes: int) -> Tables:
     to_terms = np.ascontiguousarray(np.linalg.inv(terms(nodes, n_nodes)))
     weights = np.stack([_interpolation_errors(nodes), _GRADIENT_CHANGES[:n_nodes], _SECOND_DERIVATIVES[:n_nodes]])
     return Tables(nodes, sides, to_terms, weights)
-
-
-def flat_triangles(n_nodes: int) -> Indices:
-    """Return the flat triangles (n, 3) between the nodes of a facet in 3D, oriented like the facet."""
-    return np.array(_FLAT[n_nodes])
 
 
 def terms(xi: Array, n_nodes: int) -> Array:

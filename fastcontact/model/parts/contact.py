@@ -219,10 +219,11 @@ class ModelContact(ModelConnections):
         """Apply a fluid pressure to both sides of a contact pair, wherever the fluid can penetrate from a source.
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where the contact
-        pressure does not exceed the fluid pressure. There it acts along the normals of the secondary side and, on the
-        primary side, along the normal of the gap. At finite strain these are the normals of the deformed surfaces. The
-        pressure at each secondary node is the attribute ``fluid_pressure`` of the contact result. To apply the pressure
-        of the fluid to other surfaces, use `add_pressure`.
+        pressure does not exceed the fluid pressure. There it acts on each side along the normals of this side and over
+        its own area; on the primary side this is the part that faces the wetted part of the secondary side. At finite
+        strain, normals and areas are those of the deformed surfaces. The pressure at each secondary node is the attribute
+        ``fluid_pressure`` of the contact result. To apply the pressure of the fluid to other surfaces, use
+        `add_pressure`.
 
         Parameters
         ----------
@@ -281,7 +282,8 @@ class ModelContact(ModelConnections):
         force : mapping of str to float, optional
             Force on the obstacle at multiplier 1, such as ``{"y": -100.0}`` [force], in axisymmetry integrated over the
             full circle. In these components the obstacle is a free rigid body that only contact restrains; in the other
-            components it follows `motion`. The results contain its displacement.
+            components it follows `motion`. To guide an obstacle along an oblique direction, rotate the model such that this
+            direction is an axis. The results contain the displacement of the obstacle.
         rotation : mapping, optional
             Rotation of the obstacle about an axis that moves with `motion`. ``angle``: angle at multiplier 1 [radian].
             ``centre``: a point (dim,) on the axis before any motion [length]. ``axis``, in 3D: direction of the axis.
@@ -318,6 +320,13 @@ class ModelContact(ModelConnections):
         """
         from fastcontact.contact.obstacles.meshed import MeshedSurface
 
+        for option in ("axes", "direction"):
+            if option in options:
+                axes = " or ".join("xyz"[: self.mesh.dim])
+                raise ModelError(
+                    f"'{option}' of obstacle '{name}': obstacles are moved, pushed and guided along {axes}: give 'motion' or "
+                    "'force' by components, or rotate the points of the mesh such that the guided direction is an axis"
+                )
         components = axis_values(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(components.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
         if not np.isfinite(displacement).all():

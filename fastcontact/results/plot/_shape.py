@@ -17,9 +17,9 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.paths import checked_target, replacing
 from fastcontact.arrays import Array
-from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_triangles
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import MODEL_UNITS, Axes, Units, new_axes, position_text, units_of

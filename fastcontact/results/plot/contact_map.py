@@ -9,8 +9,8 @@ import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError, check_known
+from fastcontact.mesh.flat_pieces import flat_triangles
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.layout import CONTACT_FIELDS

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import is_dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -214,7 +215,7 @@ def axis_stress(
         Name of the contact pair. The depth is measured from its node nearest to the middle of the contact.
     theories : mapping of str to object, optional
         Theories, by their labels in the legend: objects with the method ``stress_on_axis(depth)``, such as
-        `analytic.hertz_point`.
+        `analytic.hertz_point`. If Poisson's ratios of the two bodies of a theory differ, both have their own curves.
     title, units, ax
         Described for `pressure_profile`.
 
@@ -255,8 +256,9 @@ def axis_stress(
                 face, label = ("none" if number else colour), f"{caption}, {name}"
                 axes.plot(depth[rows], value[rows], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     depths = np.linspace(0.0, reach, 400)
-    for style, (label, theory) in zip(("-", "--", ":"), (theories or {}).items(), strict=False):
-        exact = theory.stress_on_axis(depths)
+    by_ratio = (curve for label, theory in (theories or {}).items() for curve in _by_poissons_ratio(label, theory))
+    for style, (label, stress_at) in zip(("-", "--", ":", "-."), by_ratio, strict=False):
+        exact = stress_at(depths)
         curves = [*(exact[:, component] for component in COMPONENTS.values()), von_mises(exact)]
         for colour, curve in zip(COLOURS, curves, strict=True):
             axes.plot(depths, curve, style, color=colour, lw=1.0)
@@ -268,6 +270,14 @@ def axis_stress(
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     return axes
+
+
+def _by_poissons_ratio(label: str, theory: Any) -> list[tuple[str, Callable[[Array], Array]]]:
+    """Return the label of a theory and its stress on the axis, for both bodies if their Poisson's ratios differ."""
+    bodies, stress = getattr(theory, "bodies", None), theory.stress_on_axis
+    if bodies is None or bodies.E2 is None or bodies.nu1 == bodies.nu2:
+        return [(label, stress)]
+    return [(f"{label}, nu = {nu:g}", partial(stress, nu=nu)) for nu in (bodies.nu1, bodies.nu2)]
 
 
 def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, Indices, Array]:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import AnyArray, Array
-from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_triangles
 
 # Number of subdivisions of each side of a cell, for curved sides and for fields that are not linear within the cell.
 CUTS = 4

@@ -8,8 +8,8 @@ import numpy as np
 
 from fastcontact._tools.neighbours import pairs_within
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_triangles
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot.fields import Field

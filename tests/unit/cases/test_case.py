@@ -10,6 +10,8 @@ from refusals import refused
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
+from fastcontact.cli.cases import copy_case
+from fastcontact.mesh.generate import block, renamed
 
 SOLVE = '[solve]\nlinear_solver = "direct"\ngeometry_updates = 2\n'
 CHECK = '[[check]]\nquantity = "C1.stress.yy"\ntheory = "hertz"\ntolerance = 0.05\n'
@@ -190,9 +192,20 @@ MISTAKES = {
         ("approach = 4.0", "approach = -4.0", r"theory.hertz"),
         ("E = 20000.0\nnu", "groups = [3]\nE = 20000.0\nnu", r"'material\[0\].groups' must be a list of strings or"),
         ('primary = "CONT2"', 'primary = "CONT2"\nformulation = 3', r"'contact.hertz.formulation' must be a string"),
+        (
+            '"CONT2"',
+            '"CONT2"\nsurface_smoothing = 0',
+            r"'contact.hertz.surface_smoothing' must be true or false, not 0",
+        ),
+        (
+            "nu = 0.3",
+            "nu = 0.3\nincompatible_modes = 1",
+            r"'material\[0\].incompatible_modes' must be true or false, not 1",
+        ),
+        ("geometry_updates = 2", "keep_pairing = 1", r"'solve.keep_pairing' must be true or false, not 1"),
     ],
     LOADED: [
-        ("distribute = true", "distribute = 2", r"'force\[0\].distribute' must be true or false, not the int 2"),
+        ("distribute = true", "distribute = 1", r"'force\[0\].distribute' must be true or false, not 1"),
         ("ramp = [[0.0, 1.0], [1.0, 1.0]]", "ramp = [[0.0]]", r"'support\[0\].ramp' must be|'support\[1\].ramp' must"),
         ('component = "y"\n', "", r"couple\[0\] needs 'component'"),
         ('["A2", "y", 1.0]', '["A2", "y"]', r"'relation\[0\].terms' must be a list of"),
@@ -201,6 +214,7 @@ MISTAKES = {
     OBSTACLE: [
         ('secondary = "CONT1"\n', "", r"obstacle.plane needs 'secondary'"),
         ("half_space", "half_spaces", r"did you mean 'half_space'"),
+        ('"half_space"', '"sphere", hollow = 1', r"'obstacle.plane.shape.hollow' must be true or false, not 1"),
         ("normal =", "normals =", r"'obstacle.plane.shape.normals'"),
         (", normal = [0.0, -1.0]", "", r"'obstacle.plane.shape' needs 'normal'"),
         ("y = -2.0 }", 'y = "down" }', r"'obstacle.plane.motion' must be a table of numbers by name"),
@@ -294,3 +308,39 @@ def test_what_has_none_says_why(folder, capsys):
 )
 def test_what_is_refused_before_numerics(folder, asked, message):
     refused(fc.FastcontactError, message, read_case, written(folder, asked))
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ('["lower.med", "upper.med"]', None),
+        (
+            '["lower.med", "again.med"]',
+            "'lower.med' and 'again.med' both have a group 'LOWER_\\w+': rename one of them",
+        ),
+        ("[]", "'mesh.file' must be a path or a list of paths"),
+        ('["lower.med", 3]', "'mesh.file' must be a path or a list of paths"),
+    ],
+)
+def test_several_mesh_files_are_joined(files, words, write, tmp_path):
+    lower = renamed(block((1.0, 1.0), (2, 2)), lambda group: f"LOWER_{group}")
+    upper = renamed(block((1.0, 1.0), (2, 2), origin=(0.0, 1.0)), lambda group: f"UPPER_{group}")
+    for name, mesh in (("lower", lower), ("upper", upper), ("again", lower)):
+        fc.write_mesh(tmp_path / f"{name}.med", mesh)
+    text = (
+        f'kinematics = "plane_strain"\n[mesh]\nfile = {files}\n[[material]]\nE = 1000.0\nnu = 0.0\n'
+        '[[support]]\ngroup = "LOWER_BOTTOM"\nx = 0.0\ny = 0.0\n[[support]]\ngroup = "UPPER_LEFT"\nx = 0.0\n'
+        '[[pressure]]\ngroup = "UPPER_TOP"\nvalue = 2.0\n'
+        '[contact.joint]\nsecondary = "UPPER_BOTTOM"\nprimary = "LOWER_TOP"\n[ramp]\nsteps = 1\n'
+    )
+    path = write(text)
+    if words:
+        refused(fc.CaseError, words, read_case, path)
+        return
+    case = read_case(path)
+    assert case.mesh.n_points == lower.n_points + upper.n_points
+    assert fc.solve(case.model, case.ramp)[-1].contact["joint"].pressure == pytest.approx(2.0)
+    (tmp_path / "copy").mkdir()
+    copied = copy_case(path, tmp_path / "copy/c.toml")
+    assert [file.name for file in copied] == ["c.toml", "lower.med", "upper.med"]
+    assert read_case(copied[0]).mesh.n_points == case.mesh.n_points

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
 from fastcontact.contact.obstacles import MeshedSurface
-from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_triangles
 from fastcontact.mesh.generate import block, box, quarter_disc, sphere_octant
 from fastcontact.model.body_overlap import winding_numbers
 

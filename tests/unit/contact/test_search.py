@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 from fastcontact import ContactError
 from fastcontact._jit import decorators
 from fastcontact.contact.projection import closest, closest_of_types
-from fastcontact.contact.search.facet_tables import flat_triangles, tables, terms
+from fastcontact.contact.search.facet_tables import tables, terms
 from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_triangles
 
 
 def search(points, corners):

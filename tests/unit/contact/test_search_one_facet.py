@@ -8,9 +8,10 @@ from test_search import grid
 
 from fastcontact.contact.search import facets_3d_kernels, straight_3d_kernels
 from fastcontact.contact.search import projection_3d_kernels as projection3d
-from fastcontact.contact.search.facet_tables import flat_triangles, tables
+from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_triangles
 
 OF_SIZE = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}
 

@@ -63,6 +63,9 @@ def test_no_equations_is_a_plain_solution_and_the_solver_describes_itself(name, 
     assert solver.counters.setups == 1
     assert solver.counters.iterations >= 1
     assert type(solver).__name__ in repr(solver)
+    if not solver.iterative:
+        assert solver.improve(2.0)
+        np.testing.assert_array_equal(solver.load(f).solve(B[:0], np.empty(0))[0], solver.refined_solution(f))
 
 
 def test_auto_chooses_by_dimension_and_size():

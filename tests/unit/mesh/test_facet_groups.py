@@ -5,14 +5,12 @@ import sys
 import meshio
 import numpy as np
 import pytest
-from models import assert_same_mesh, body_of
+from models import FLAT, SOLIDS, assert_same_mesh, body_of
 from refusals import refused
 
 import fastcontact as fc
 from fastcontact.mesh import elements
 from fastcontact.mesh.topology import bodies, outer_facets
-
-FLAT, SOLIDS = ([name for name, element in elements.ELEMENTS.items() if element.dim == dim] for dim in (2, 3))
 
 
 def bar(element):

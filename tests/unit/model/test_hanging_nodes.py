@@ -7,8 +7,10 @@ import pytest
 from models import elastic_model, united
 
 import fastcontact as fc
+from fastcontact import cli
 from fastcontact.mesh.generate import block, box
-from fastcontact.model.hanging_nodes import hanging_nodes, hanging_nodes_warning
+from fastcontact.mesh.hanging_nodes import hanging_nodes
+from fastcontact.model.hanging_nodes import hanging_nodes_warning
 
 pytestmark = pytest.mark.pairwise
 
@@ -141,6 +143,26 @@ def test_the_warning_comes_before_the_solution_and_a_mesh_that_fits_is_silent(fi
         assert texts[0].startswith(
             f"4 nodes lie on facets of their own body that they do not belong to (first: point {first} at"
         )
+    assert fc.quality(mesh).hanging_nodes == "".join(texts)
+
+
+CASE = """kinematics = "plane_strain"
+[mesh]
+file = "plates.med"
+[[material]]
+E = 2e5
+nu = 0.3
+"""
+
+
+@pytest.mark.parametrize("name", ["plates.med", "case.toml"])
+@pytest.mark.parametrize("fine", [4, 8])
+def test_info_shows_the_warning(name, fine, tmp_path, capsys):
+    fc.write_mesh(tmp_path / "plates.med", plates("quad4", 4, fine))
+    (tmp_path / "case.toml").write_text(CASE)
+    assert cli.main(["info", str(tmp_path / name)]) == 0
+    shown = capsys.readouterr().out
+    assert ("warning: 4 nodes lie on facets of their own body that they do not" in shown) == (fine == 8)
 
 
 @pytest.mark.parametrize("thickness", [1.0, 0.1, 0.01])

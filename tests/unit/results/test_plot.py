@@ -131,6 +131,14 @@ def test_stresses_on_the_axis_are_those_of_the_nodes_there(result):
         curve = next(line for line in drawn.lines if line.get_label() == "along the axis, lower body")
         below = (side == -1) & (depth <= 4 * results[-1].contact["hertz"].radius[0])
         np.testing.assert_array_equal(curve.get_ydata(), stress[below, 1])
+        assert [line.get_label() for line in drawn.lines if line.get_color() == "k"] == ["theory"]
+        unlike = fc.analytic.hertz_point(E1=2e4, nu1=0.3, R1=50.0, E2=2e4, nu2=0.45, R2=50.0, approach=4.0)
+        drawn = fc.plot.axis_stress(results.mesh, results[-1], "hertz", {"theory": unlike})
+        labels = [line.get_label() for line in drawn.lines if line.get_color() == "k"]
+        assert labels == ["theory, nu = 0.3", "theory, nu = 0.45"]
+        curves = [line.get_ydata() for line in drawn.lines if len(line.get_xdata()) == 400]
+        depths = np.linspace(0.0, 4 * results[-1].contact["hertz"].radius[0], 400)
+        np.testing.assert_allclose(curves[5], unlike.von_mises(0.0, -depths, 0.45))
 
 
 def test_zones_show_every_closed_node_of_every_step(result):

@@ -11,7 +11,7 @@ from refusals import refused
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
 from fastcontact.studies.case_parameters import substitute
-from fastcontact.studies.quantities import contact_radius, peak
+from fastcontact.studies.quantities import contact_radius, node_spacings, peak
 
 DATA = {
     "kinematics": "plane_strain",
@@ -89,6 +89,21 @@ def test_where_no_vertex_is_near_the_node_itself_is_taken():
     value, where = peak(mesh, values, axisymmetric=False)
     assert value == 5.0
     assert where.tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(("element", "distance"), [("quad4", 0.5), ("quad8", 0.25)])
+def test_quantities_that_are_positions_of_nodes_are_known_to_half_their_distance(element, distance):
+    mesh = fc.generate.block((1.0, 2.0), (4, 4), element)
+    values = mesh.points @ [1.0, 2.0]
+    pair = SimpleNamespace(radius=(1.0, 1.2), stick_radius=(np.nan, np.nan))
+    far = SimpleNamespace(radius=(1.0, np.inf), stick_radius=(0.4, 0.5))
+    step = SimpleNamespace(contact={"c": pair, "far": far}, von_mises=values)
+    found = node_spacings(step, "c", {"von_mises_max": values.max(), "contact_radius": 1.1}, mesh)
+    expected = {"c.radius": 0.1, "contact_radius": 0.1, "far.stick_radius": 0.05, "von_mises_depth": 0.5 * distance}
+    assert found == pytest.approx(expected)
+    # Interpolated values.
+    found = node_spacings(step, "c", {"von_mises_max": 1.01 * values.max(), "contact_radius": 1.13}, mesh)
+    assert found == pytest.approx({"c.radius": 0.1, "far.stick_radius": 0.05})
 
 
 def contact(pressure, radius, r=None):

@@ -161,6 +161,41 @@ def test_values_that_are_not_monotonic_support_no_model_error(case):
     assert quantities["pressure_max"]["model_error"] == pytest.approx(0.04, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("values", "converging"),
+    [
+        ([1.00009935, 1.0000994, 1.0000993], True),  # agree, but their changes grow
+        ([1.01, 1.02, 1.03], False),  # change monotonically, but not less and less
+    ],
+)
+def test_sentences_on_model_error_and_convergence_do_not_contradict_each_other(case, values, converging):
+    levels = [made_up(k) for k in range(3)]
+    for level, value in zip(levels, values, strict=True):
+        level["values"]["force"] = value * FORCE
+    study = gathered(case, [levels])
+    entry, text = study.as_dict()["quantities"]["force"], "\n".join(study.lines())
+    assert entry["converging"] == converging
+    assert ("The contact force does not converge" in text) != converging
+    assert ("contact force differs from theory by +0.010 %. Of that, +0.009" in text) == converging
+    assert ("Its values do not converge" in text) != converging
+    if converging:
+        assert entry["uncertainty"] >= np.ptp(values) * FORCE
+    else:
+        assert entry["model_error"] is None
+
+
+def test_the_position_of_a_node_is_known_to_half_the_distance_between_nodes(case):
+    """Nested meshes share the node with the largest stress, whose position never changes."""
+    levels = [made_up(k) for k in range(3)]
+    for k, level in enumerate(levels):
+        level["values"]["von_mises_depth"], level["spacings"] = 0.27, {"von_mises_depth": 0.04 * 0.5**k}
+    study = gathered(case, [levels])
+    assert study.as_dict()["quantities"]["von_mises_depth"]["uncertainty"] == 0.01
+    (row,) = (row for row in limit_rows(study.best, {}) if row[0].startswith("depth"))
+    assert "0.01 (node spacing)" in row
+    assert "+0.000 %" not in row
+
+
 @pytest.fixture(scope="module")
 def on_a_mesh_file(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")

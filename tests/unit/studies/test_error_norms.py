@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from models import body_of, elastic_model, made_of
+from models import FLAT, SOLIDS, body_of, elastic_model, made_of
 from refusals import refused
 
 import fastcontact as fc
@@ -12,10 +12,8 @@ from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.mesh import elements
 
 E, NU = 1000.0, 0.3
-FACES = [e.name for e in elements.ELEMENTS.values() if e.dim == 2]
-SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]
-QUADRATIC = [name for name in FACES + SOLIDS if elements.get(name).order == 2]
-ALL = [(name, kind) for name in FACES for kind in ("plane_strain", "plane_stress", "axisymmetric")]
+QUADRATIC = [name for name in FLAT + SOLIDS if elements.get(name).order == 2]
+ALL = [(name, kind) for name in FLAT for kind in ("plane_strain", "plane_stress", "axisymmetric")]
 ALL += [(name, "3d") for name in SOLIDS]
 
 

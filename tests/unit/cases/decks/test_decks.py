@@ -235,6 +235,19 @@ def test_a_rigid_body_turns_by_a_moment_at_its_reference_node_or_rotation_node(t
     assert reference["moment"][1] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_results_of_the_model_are_converted_to_those_of_the_deck(tmp_path):
+    """The support that locks the rigid body in the second step is a multi-point constraint of the model."""
+    rigid = "*Node, nset=ref\n90, 0.5, 0.5, 2.5\n*Rigid Body, elset=up, ref node=90\n"
+    second = "*Step\n*Static\n*Boundary, fixed\nref, 3\n*Cload\nref, 3, -5.\n*End Step\n"
+    load = "*Boundary\nref, 1, 2\nref, 4, 6\n*Cload\nref, 3, -1.\n"
+    text = NODES + rigid + MATERIAL + CONTACT + "*Boundary\nbottom, 1, 3\n" + STEP + second
+    deck = deck_of(tmp_path, text.replace("*Dsload\nroof, P, 100.\n", load))
+    last, plain = deck.solve()[-1], fc.solve(deck.model, deck.ramp, criteria=deck.criteria)[-1]
+    assert last.reference_reactions["ref"]["force"] == pytest.approx([0.0, 0.0, 4.0], abs=1e-9)
+    assert plain.reference_reactions["ref"]["force"] == pytest.approx([0.0] * 3, abs=1e-9)
+    assert deck.finished(plain).reference_reactions == last.reference_reactions
+
+
 @pytest.mark.parametrize("kind", ["Kinematic", "Distributing"])
 def test_forces_and_moments_at_a_coupling_reach_the_floor(tmp_path, kind):
     coupling = f"*Node\n90, 0.7, 0.5, 3.\n*Coupling, constraint name=c, ref node=90, surface=roof\n*{kind}\n1, 3\n"

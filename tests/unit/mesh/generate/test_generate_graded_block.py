@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
+from models import FLAT, SOLIDS
 
 import fastcontact as fc
 from fastcontact.mesh import elements
 
-FACES = [e.name for e in elements.ELEMENTS.values() if e.dim == 2]
-SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]
 GROUPS = {"BLOCK", "TOP", "CONTACT", "BOTTOM", "SIDE", "SYMMETRY_X", "POLE"}
 
 
-@pytest.mark.parametrize("element", FACES + SOLIDS)
+@pytest.mark.parametrize("element", FLAT + SOLIDS)
 def test_it_fills_the_block_and_names_its_sides(element):
     mesh = fc.generate.graded_block(element, width=4.0, depth=3.0, contact_radius=0.8, contact_size=0.4)
     dim = mesh.dim
