@@ -91,7 +91,7 @@ def test_wear_of_the_track_converges_with_the_steps(friction):
         assert any("moves along" in text for text in steps[-1].warnings) == (count < 16), steps[-1].warnings
     assert errors[0] < 0.1
     assert errors[2] < 0.6 * errors[1] < 0.6 * errors[0]
-    np.testing.assert_allclose(works, works[2], rtol=0.03)
+    np.testing.assert_allclose(works, works[2], rtol=0.04)
 
 
 def test_wear_of_the_pad_does_not_depend_on_the_steps():
