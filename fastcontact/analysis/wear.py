@@ -104,11 +104,14 @@ def wear_compliance(
 def wear_work(depth: Array, earlier_depth: Array, forces: ContactForces, before: ContactForces | None) -> float:
     """Return the work of the normal forces in a load step on the increase of the wear depth (m,) [energy].
 
-    `forces` and `before` are the contact forces at the end and at the beginning of the step, None before the first step.
+    `forces` and `before` are the contact forces at the end and at the beginning of the step, None before the first step. A
+    node that a moving contact reaches or leaves wears only while its force acts, which is therefore not halved.
     """
     if before is None:
         return 0.0
-    return 0.5 * float((forces.pressing_with(before) + before.pressing_with(forces)) @ (depth - earlier_depth))
+    return 0.5 * float(
+        (forces.pressing_with(before, 2.0) + before.pressing_with(forces, 2.0)) @ (depth - earlier_depth)
+    )
 
 
 def linearisation_error(pair: Formulation, wear: WearCompliance, after: WearCompliance) -> float:

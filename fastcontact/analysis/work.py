@@ -49,7 +49,7 @@ class ContactForces:
     tangential : ndarray (n_points, dim)
         Nodal forces of the tangential contact forces [force].
     pressing, added : ndarray (n_nodes,)
-        Normal forces on the secondary nodes [force], and the contribution of clearances and wear to their gaps [length].
+        Normal forces on the secondary nodes [force], and the contribution of clearances to their gaps [length].
     stored : float
         Energy of penalties, normal and tangential [energy].
     areas : ndarray (m,)
@@ -104,9 +104,12 @@ class ContactForces:
         gained, lost = float(np.maximum(excess, 0.0).sum()), float(np.maximum(-excess, 0.0).sum())
         return lost / max(gained, lost, TINY)
 
-    def pressing_with(self, other: ContactForces) -> Array:
-        """Return the normal forces (n_nodes,) that act on gaps during the step, if `other` are those at its other end."""
-        return self.pressing * np.where(other.pressing != 0.0, 1.0, self.passed_on(other))
+    def pressing_with(self, other: ContactForces, at_one_end: float = 1.0) -> Array:
+        """Return the normal forces (n_nodes,) that act on gaps during the step, if `other` are those at its other end.
+
+        Forces of a moving contact at nodes without a force at the other end are multiplied by `at_one_end`.
+        """
+        return self.pressing * np.where(other.pressing != 0.0, 1.0, at_one_end * self.passed_on(other))
 
     def normal_work(self, other: ContactForces, displacement: Array) -> tuple[float, float]:
         """Return half the work of normal forces in the step, and the energy of penalties where gaps open or close [energy].
@@ -176,14 +179,15 @@ class Work:
         stored : float
             Energy of penalties, cohesive layers and adhesion at the end of the step [energy].
         added : sequence of three float
-            Increments of `friction`, `touching` and `imbalance`, see `contact_work`, summed over all pairs [energy].
+            Increments of `friction`, `touching` and the sum of `imbalance` and `wear`, see `contact_work`, of all pairs
+            together [energy].
         released : float
             Energy dissipated by cohesive layers so far [energy].
         wear : float
             Increment of `wear` [energy].
         """
-        friction, touching, imbalance = added
-        sums = self.friction + friction, self.touching + touching, self.imbalance + imbalance
+        friction, touching, contact = added
+        sums = self.friction + friction, self.touching + touching, self.imbalance + contact - wear
         work = Work(energy[0], *sums, stored, plastic=energy[1], released=released, wear=self.wear + wear)
         terms = (self.largest, *energy, work.friction, abs(work.external))
         return replace(work, largest=max(terms))
@@ -222,7 +226,7 @@ def contact_work(
     -------
     forces : ContactForces
     increments : (float, float, float)
-        Increments of `Work.friction`, `Work.touching` and `Work.imbalance` [energy].
+        Increments of `Work.friction`, `Work.touching` and the sum of `Work.imbalance` and `Work.wear` [energy].
     slip_integrals : ndarray (m,)
         Integrals of the normal forces over the slips in the step [energy].
     """
@@ -364,8 +368,9 @@ def _forces(
     all_forces = np.column_stack([normal, tangents]).T
     amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
     nodes, added = pair.node_candidates, np.zeros(len(contact.gap))
-    if pair.options.clearance is not None or configuration.wear_depth is not None:
-        added = pair.added_gap(nodes, pair.pair_candidates(nodes, configuration, np.inf), configuration)
+    if pair.options.clearance is not None or pair.options.clearance_primary is not None:
+        pairing = pair.pair_candidates(nodes, configuration, np.inf)
+        added = pair.added_gap(nodes, pairing, replace(configuration, wear_depth=None))
     return ContactForces(
         constraints.positions, normal * inverse_area, force * inverse_area[:, None], penetration * normal,
         (rows.data, rows.indices, rows.indptr), nodal_forces.reshape(-1, dim),

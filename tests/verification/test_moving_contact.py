@@ -77,7 +77,7 @@ def test_external_work_is_that_of_the_forces_on_the_pad(name, count):
 @pytest.mark.parametrize("friction", [None, FRICTION])
 def test_wear_of_the_track_converges_with_the_steps(friction):
     """Where the complete pad has passed, the depth is k p times its width; the sum is exact for any number of steps."""
-    errors = []
+    errors, works = [], []
     for count in (4, 8, 16):
         options = {} if friction is None else {"friction": friction}
         steps, _ = slid(count, 5.0, wear=COEFFICIENT, **options)
@@ -87,9 +87,11 @@ def test_wear_of_the_track_converges_with_the_steps(friction):
         assert np.trapezoid(depth, x) == pytest.approx(COEFFICIENT * FORCE * 5.0, rel=5e-3)
         passed = (x > 4.3) & (x < 5.8)
         errors.append(np.abs(depth[passed] / (COEFFICIENT * PRESSURE * WIDTH) - 1.0).max())
+        works.append(steps[-1].work["wear_work"])
         assert any("moves along" in text for text in steps[-1].warnings) == (count < 16), steps[-1].warnings
     assert errors[0] < 0.1
     assert errors[2] < 0.6 * errors[1] < 0.6 * errors[0]
+    np.testing.assert_allclose(works, works[2], rtol=0.04)
 
 
 def test_wear_of_the_pad_does_not_depend_on_the_steps():

@@ -240,13 +240,15 @@ def test_a_function_of_position_is_a_profile(formulation):
     assert difference(one, two) < 2e-3
 
 
-def test_an_interference_may_grow_over_the_load_steps():
+@pytest.mark.parametrize("clearance", ["clearance", "clearance_primary"])
+def test_an_interference_may_grow_over_the_load_steps(clearance):
     ramp = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]
-    model = touching(held(blocks(), approach=0.0), "mortar", clearance=-0.02, clearance_ramp=ramp)
+    model = touching(held(blocks(), approach=0.0), "mortar", **{clearance: -0.02}, clearance_ramp=ramp)
     steps = fc.solve(model, fc.Ramp((0.5, 1.0, 1.5, 2.0), ((0.0, 0.0), (2.0, 0.0))))
     largest = [step.contact["pair"].pressure_max for step in steps]
     assert largest[:3] == pytest.approx(np.array([0.5, 1.0, 0.5]) * 1000.0 / 0.91 * 0.02 / 10.0, rel=1e-12)
     assert largest[3] == pytest.approx(0.0, abs=1e-12 * largest[1])
+    assert steps[1].work["external_work"] == pytest.approx(steps[1].work["strain_energy"], rel=1e-3)
 
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
