@@ -68,8 +68,8 @@ def solve(
         """
         nonlocal next_active
         estimate = _with_next_set(constraints, accuracy, equations, u, forces, active, error)
-        changes_again = (estimate.wanted != active) & changed
-        next_active = None if estimate.settled or changes_again.any() else estimate.wanted
+        changes_again = (estimate.next_active != active) & changed
+        next_active = None if estimate.settled or changes_again.any() else estimate.next_active
         return next_active is not None
 
     while True:
@@ -87,11 +87,11 @@ def solve(
         if solution.settled or iteration == accuracy.max_iterations:
             return replace(solution, iterations=iteration, response=partial(_response, loaded, B, rows, constraints))
         earlier_sets.add(active.tobytes())
-        least_index = least_index or solution.wanted.tobytes() in earlier_sets
+        least_index = least_index or solution.next_active.tobytes() in earlier_sets
         if least_index:
-            lowest = np.flatnonzero(active != solution.wanted)[0]
-            solution.wanted[:lowest], solution.wanted[lowest + 1 :] = active[:lowest], active[lowest + 1 :]
-        active = solution.wanted
+            lowest = np.flatnonzero(active != solution.next_active)[0]
+            solution.next_active[:lowest], solution.next_active[lowest + 1 :] = active[:lowest], active[lowest + 1 :]
+        active = solution.next_active
         iteration += 1
 
 

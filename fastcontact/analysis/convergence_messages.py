@@ -65,7 +65,7 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
             f"residual of its equations is {solution.residual:.1e} of the largest force. With the coefficient of friction "
             f"{constraints.friction.max():g} there may be no solution: use less friction"
         )
-    count = int((solution.active != solution.wanted).sum())
+    count = int((solution.active != solution.next_active).sum())
     constraints_text = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
     cause = f"{constraints_text}, at {named_nodes(problem, nodes)}" if count else "directions of slip still change"
     remedy = "the direct linear solver or " if problem.solver.iterative else ""

@@ -167,7 +167,9 @@ def _settle(
         iterate.u[problem.dofs.active] = displacement
         _store_solution(iterate, constraints, solution, relative_change)
         if not (solution.settled or accuracy.inexact):
-            nodes_that_change = nearest_nodes(problem, constraints, np.flatnonzero(solution.active != solution.wanted))
+            nodes_that_change = nearest_nodes(
+                problem, constraints, np.flatnonzero(solution.active != solution.next_active)
+            )
             iterate.history[-1]["nodes"] = nodes_that_change
             text = active_set_cycles(problem, constraints, solution, nodes_that_change)
             raise ConvergenceError(text, iterate.history)
@@ -218,7 +220,7 @@ def _store_solution(
     `relative_change` is the change of the displacements relative to the largest one, zero if it is round-off [-].
     """
     for name, rows in constraints.rows.items():
-        iterate.active[name] = solution.wanted[rows]
+        iterate.active[name] = solution.next_active[rows]
         forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
         iterate.pressure[name] = constraints.parts[name].pressure(forces)  # without fluid pressure
     entry = {"displacement_change": relative_change, "active": int(solution.active.sum())}

@@ -321,7 +321,7 @@ class _FloatingContact:
         lift, dofs = self.step.load.lift + self.bodies.rigid(anchor), self.step.problem.dofs
         step = self.step if loaded is None else replace(self.step, loaded=loaded)
         solution = _solution(step, self.constraints, self.iterate, self.active, self.accuracy, lift, self.guess)
-        self.active, self.guess = solution.wanted, self.guess.copy()
+        self.active, self.guess = solution.next_active, self.guess.copy()
         self.guess[dofs.active] = lift[dofs.active] + dofs.T @ solution.u
         return solution
 

@@ -152,7 +152,7 @@ class SharedNodes:
             gap=gap,
             slip=along_own_tangents(solution.slip),
             active=active,
-            wanted=active,
+            next_active=active,
             sticking=solution.sticking[representative],
             integrals=None if integrals is None else fractions * integrals[:, representative],
             slip_before_closing=None if early_slip is None else along_own_tangents(early_slip),

@@ -225,7 +225,7 @@ class Solution:
         Gaps [length].
     active : ndarray of bool (m,)
         Active set of this solution: constraints that are closed.
-    wanted : ndarray of bool (m,)
+    next_active : ndarray of bool (m,)
         Initial active set of the next solution. Without friction it follows from the signs of gaps and multipliers, and
         equals `active` if all inequalities hold.
     settled : bool
@@ -257,7 +257,7 @@ class Solution:
     multiplier: Array
     gap: Array
     active: Mask
-    wanted: Mask
+    next_active: Mask
     settled: bool
     iterations: int
     tangential: Array
@@ -280,7 +280,7 @@ class Solution:
         """Return the solution of one contact pair, given the rows of its `constraints` in the solution of all pairs."""
         along, early_slip = (rows, slice(len(constraints.tangents))), self.slip_before_closing
         return Solution(
-            self.u, self.multiplier[rows], self.gap[rows], self.active[rows], self.wanted[rows], self.settled,
+            self.u, self.multiplier[rows], self.gap[rows], self.active[rows], self.next_active[rows], self.settled,
             self.iterations, self.tangential[along], self.slip[along], self.sticking[rows], self.residual,
             constraints.directions, integrals=None if self.integrals is None else self.integrals[:, rows],
             slip_before_closing=None if early_slip is None else early_slip[along],
