@@ -28,12 +28,7 @@ def measure(command: list[str]) -> tuple[float, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", nargs="*", default=[str(CASES / f"forma04{letter}.toml") for letter in "abc"])
-    parser.add_argument(
-        "--runs",
-        type=int,
-        default=5,
-        help="measured runs of each case, after a warm-up (default 5)",
-    )
+    parser.add_argument("--runs", type=int, default=5, help="measured runs of each case, after a warm-up (default 5)")
     options = parser.parse_args()
     print(f"{'case':<24} {'CPU s (median)':>14} {'min':>8} {'max':>8} {'peak MB':>9}")
     with tempfile.TemporaryDirectory() as folder:

@@ -30,21 +30,11 @@ from fastcontact.elasticity.anisotropic_materials import Anisotropic as Anisotro
 from fastcontact.elasticity.anisotropic_materials import Orthotropic as Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes as CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic as LinearElastic
-from fastcontact.elasticity.nonlinear_materials import (
-    ElasticPlastic as ElasticPlastic,
-)
-from fastcontact.elasticity.nonlinear_materials import (
-    MooneyRivlin as MooneyRivlin,
-)
-from fastcontact.elasticity.nonlinear_materials import (
-    NeoHookean as NeoHookean,
-)
-from fastcontact.elasticity.nonlinear_materials import (
-    Ogden as Ogden,
-)
-from fastcontact.elasticity.nonlinear_materials import (
-    Yeoh as Yeoh,
-)
+from fastcontact.elasticity.nonlinear_materials import ElasticPlastic as ElasticPlastic
+from fastcontact.elasticity.nonlinear_materials import MooneyRivlin as MooneyRivlin
+from fastcontact.elasticity.nonlinear_materials import NeoHookean as NeoHookean
+from fastcontact.elasticity.nonlinear_materials import Ogden as Ogden
+from fastcontact.elasticity.nonlinear_materials import Yeoh as Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated as Tabulated
 from fastcontact.errors import CaseError as CaseError
 from fastcontact.errors import ContactError as ContactError

@@ -110,10 +110,7 @@ def materials(given, path):
             {
                 "model_part_name": "Structure.SOLID",
                 "properties_id": 1,
-                "Material": {
-                    "constitutive_law": {"name": "LinearElasticAxisym2DLaw"},
-                    "Variables": numbers,
-                },
+                "Material": {"constitutive_law": {"name": "LinearElasticAxisym2DLaw"}, "Variables": numbers},
             }
         ]
     }

@@ -15,12 +15,7 @@ Results = Mapping[str, list[dict[str, Any]]]
 
 def environment() -> dict[str, Any]:
     """Return versions, cores and threads."""
-    return {
-        "versions": versions(),
-        "machine": platform.machine(),
-        "cores": os.cpu_count(),
-        "threads": _jit.threads(),
-    }
+    return {"versions": versions(), "machine": platform.machine(), "cores": os.cpu_count(), "threads": _jit.threads()}
 
 
 def lines(results: Results, before: Results | None = None) -> list[str]:

@@ -38,11 +38,7 @@ def kinds_of(function: Callable[..., Any]) -> dict[str, Any]:
 # Keys of the tables of a case file, with the TOML types of their values.
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
-SOLVE: dict[str, Any] = {
-    "linear_solver": str,
-    "linear_tolerance": NUMBER,
-    **kinds_of(Criteria),
-}
+SOLVE: dict[str, Any] = {"linear_solver": str, "linear_tolerance": NUMBER, **kinds_of(Criteria)}
 # Keys of a rigid surface that consists of the facets of a group, in a file or in the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
 SENSITIVITY: dict[str, Any] = {"quantity": list, "by": list}

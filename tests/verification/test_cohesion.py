@@ -240,10 +240,7 @@ STRIPS = ({}, {"swap": True}, {"angle": 30.0}, {"element": "hex8"}, {"divisions"
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize(
-    "case",
-    [*STRIPS, {"pressed": -0.005}, {"pressed": 0.002}],
-)
+@pytest.mark.parametrize("case", [*STRIPS, {"pressed": -0.005}, {"pressed": 0.002}])
 def test_a_layer_in_shear_whose_nodes_are_held_along_its_normal_has_tractions(formulation, case):
     law = {"strength": 20.0, "energy": 0.8, "stiffness": 25e3}
     told, drawn, up, force, integral, contact = sheared_strips({"cohesion": law, **formulation}, **case)

@@ -337,11 +337,7 @@ def test_one_node_is_joined_with_all_of_a_group():
     ("method", "arguments", "words"),
     [
         ("add_spring", {"group": "TOP", "to": "BOTTOM_LEFT2", "y": 1.0, "translation": (0, 1)}, "out the translation"),
-        (
-            "add_force",
-            {"group": "TOP", "y": 1.0, "weighting": "linear"},
-            "point from which distances are measured: give",
-        ),
+        ("add_force", {"group": "TOP", "y": 1.0, "weighting": "linear"}, "point from which distances are measured:"),
         ("add_force", {"group": "TOP", "y": 1.0, "radius": 1.0}, "no point from which distances are measured"),
         ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0), "weighting": "square"}, "weighting 'square'"),
         ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0, 1.0)}, "needs 2 coordinates"),

@@ -65,11 +65,7 @@ def component(coefficients, f, d, s, t):
         xss, xtt = 2.0 * c4, 2.0 * c5
     if m >= 8:
         c6, c7 = coefficients[f, 6, d], coefficients[f, 7, d]
-        x, xs, xt = (
-            x + (c6 * s + c7 * t) * s * t,
-            xs + (2.0 * c6 * s + c7 * t) * t,
-            xt + (c6 * s + 2.0 * c7 * t) * s,
-        )
+        x, xs, xt = (x + (c6 * s + c7 * t) * s * t, xs + (2.0 * c6 * s + c7 * t) * t, xt + (c6 * s + 2.0 * c7 * t) * s)
         xss, xst, xtt = xss + 2.0 * c6 * t, xst + 2.0 * (c6 * s + c7 * t), xtt + 2.0 * c7 * s
     if m >= 9:
         c = coefficients[f, 8, d]

@@ -153,12 +153,7 @@ class ModelInitialStates(ModelLoads):
         self.add_temperature(values, names, reference=reference, times=times_used)
 
     def add_initial_stress(
-        self,
-        groups: Groups = None,
-        *,
-        axes: Axes = None,
-        ramp: History = None,
-        **tensor_components: Constant | None,
+        self, groups: Groups = None, *, axes: Axes = None, ramp: History = None, **tensor_components: Constant | None
     ) -> None:
         """Prescribe an initial stress in groups of solid cells.
 
@@ -192,12 +187,7 @@ class ModelInitialStates(ModelLoads):
         self._add_initial("stress", groups, tensor_components, axes, ramp)
 
     def add_initial_strain(
-        self,
-        groups: Groups = None,
-        *,
-        axes: Axes = None,
-        ramp: History = None,
-        **tensor_components: Constant | None,
+        self, groups: Groups = None, *, axes: Axes = None, ramp: History = None, **tensor_components: Constant | None
     ) -> None:
         """Prescribe a stress-free strain, for example shrinkage, swelling or misfit, in groups of solid cells.
 

@@ -9,12 +9,7 @@ from pairwise import first_of
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis.floating_bodies import (
-    MAX_NEWTON_ITERATIONS,
-    FloatingBodies,
-    PositionResponse,
-    SoftSprings,
-)
+from fastcontact.analysis.floating_bodies import MAX_NEWTON_ITERATIONS, FloatingBodies, PositionResponse, SoftSprings
 from fastcontact.analysis.solution import Solution
 from fastcontact.linear.factor_solver import CondensedProblem
 

@@ -11,11 +11,7 @@ from scipy.sparse.linalg import splu
 import fastcontact as fc
 from fastcontact.analysis import newton, step_halving
 from fastcontact.analysis.friction import cone_newton, delassus, dense
-from fastcontact.analysis.friction.cone_newton import (
-    aligning_rotation,
-    compliance_of_rows,
-    held_tangents,
-)
+from fastcontact.analysis.friction.cone_newton import aligning_rotation, compliance_of_rows, held_tangents
 from fastcontact.analysis.friction.delassus import Delassus
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints

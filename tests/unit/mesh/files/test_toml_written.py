@@ -20,13 +20,7 @@ def test_what_is_written_is_read_back(data):
 
 def test_numpy_s_numbers_and_arrays_are_plain_ones():
     data = {"E": np.float64(0.1), "steps": np.int64(3), "on": np.bool_(True), "axes": np.eye(2), "size": (1.0, 2)}
-    assert parse(dump(data)) == {
-        "E": 0.1,
-        "steps": 3,
-        "on": True,
-        "axes": [[1.0, 0.0], [0.0, 1.0]],
-        "size": [1.0, 2],
-    }
+    assert parse(dump(data)) == {"E": 0.1, "steps": 3, "on": True, "axes": [[1.0, 0.0], [0.0, 1.0]], "size": [1.0, 2]}
     assert math.isnan(parse(dump({"value": np.nan}))["value"])
 
 
