@@ -202,14 +202,13 @@ class WeightedMortar(Formulation):
         """
         coverage, D, M, weight, motion, gap_reduction, normal = means
         B = rows_of(motion, normal)
-        gap0 = B @ self.points.ravel() + config.clearance_factor * self._clearance(D, M, weight)
-        gap0 -= np.einsum("nd,nd->n", gap_reduction, normal)
+        gap0 = B @ self.points.ravel() - np.einsum("nd,nd->n", gap_reduction, normal)
+        if (added := self._added_gap(config, D, M)) is not None:
+            gap0 += self._mean_cosines(config, means) * added / weight
         dependent = coverage.nodal_map.diagonal() == 0.0
         if dependent.any():  # Gaps that supports prescribe must not contribute to the gaps of neighbouring nodes.
             prescribed = np.where(dependent, self.nodal_gap(config)[0], 0.0)
             gap0 -= csr_array(D[:, self.secondary.points]) @ prescribed / weight
-        if config.wear_depth is not None:
-            gap0 += D @ config.wear_depth / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
         nodal_map, constants = coverage.nodal_map, self._constant_attributes
         pressures = WeightedPressures(weight, nodal_map, nodal_map.T @ constants[0], *constants[1:])
@@ -504,34 +503,60 @@ class WeightedMortar(Formulation):
             return -config.deformed(self.secondary, self.points).nodal_normals
         if not isinstance(self.normals, str):
             return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
-        mean = np.zeros((len(self.secondary.points), self.points.shape[1]))
-        primary = config.deformed(self.primary, self.points)
-        normals = primary.facet_normals if self.normals == "facet" else primary.smooth_normals
-        of_blocks = np.split(normals, self.primary.offsets[1:-1])
-        normals_of = dict(zip((block.element for block in self.primary.blocks), of_blocks, strict=True))
-        tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
-        for coupling in overlap.couplings:
-            secondary_facet, primary_facet = coupling.pairs.T
-            at_nodes = normals_of[coupling.primary.element][primary_facet, : coupling.primary.facets.shape[1]]
-            integral = coupling.integrals @ at_nodes
-            np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ integral)
+        of_blocks = zip(self.secondary.blocks, self._test, strict=True)
+        tests = [np.broadcast_to(T, (len(block.facets), *T.shape)) for block, T in of_blocks]
+        mean = self._primary_normals(config, overlap, tests)
         self.secondary.add_across_ends(mean)
         length, overall = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)
         if np.linalg.norm(overall) <= LENGTH_ROUND_OFF * length.sum():
             overall = np.eye(len(overall))[-1]
         return unit_vectors(np.where(length > 0.0, mean, overall))
 
-    def _clearance(self, D: csr_array, M: csr_array, weight: Array) -> Array:
-        """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""
-        contribution = np.zeros(len(weight))
+    def _primary_normals(self, config: Configuration, overlap: Overlap, functions: Sequence[Array]) -> Array:
+        """Return the integrals (m, dim) of functions times the opposite primary normals [area].
+
+        `functions` are arrays (n_facets, k, k) of coefficients in terms of the shape functions, one for each block.
+        """
+        integrals = np.zeros((len(self.secondary.points), self.points.shape[1]))
+        primary = config.deformed(self.primary, self.points)
+        normals = primary.facet_normals if self.normals == "facet" else primary.smooth_normals
+        of_blocks = np.split(normals, self.primary.offsets[1:-1])
+        normals_of = dict(zip((block.element for block in self.primary.blocks), of_blocks, strict=True))
+        functions_of = dict(zip((block.element for block in self.secondary.blocks), functions, strict=True))
+        for coupling in overlap.couplings:
+            secondary_facet, primary_facet = coupling.pairs.T
+            at_nodes = normals_of[coupling.primary.element][primary_facet, : coupling.primary.facets.shape[1]]
+            values = functions_of[coupling.secondary.element][secondary_facet] @ (coupling.integrals @ at_nodes)
+            np.add.at(integrals, coupling.secondary.local[secondary_facet], values)
+        return integrals
+
+    def _mean_cosines(self, config: Configuration, means: Means) -> Array:
+        """Return the weighted means (m,) of the cosines between the normals of the primary side and that of a node [-].
+
+        Clearance and wear are displacements along the normals of the surface, of which the gap of a node includes the
+        components along its normal. Without these cosines, nodal pressures of a press fit deviate by up to 1 %, see
+        `test_pressures_of_clearances_are_those_of_overlapping_meshes`.
+        """
+        if isinstance(self.primary, RigidSide):
+            integrals = means.D[:, self.secondary.points] @ means.normal
+        elif not isinstance(self.normals, str) or self.normals == "secondary":
+            return np.ones(len(means.weight))
+        else:
+            functions = [psi for psi, _ in means.coverage.functions]
+            integrals = means.coverage.nodal_map.T @ self._primary_normals(config, means.coverage.overlap, functions)
+        return np.einsum("nd,nd->n", integrals, means.normal) / means.weight
+
+    def _added_gap(self, config: Configuration, D: csr_array, M: csr_array) -> Array | None:
+        """Return the integrals (m,) of psi times clearances and wear depth [volume]; None without clearance and wear."""
+        contributions, factor = [], config.clearance_factor
         for matrix, side, clearance in (
             (D, self.secondary, self.options.clearance), (M, self.primary, self.options.clearance_primary)
         ):  # fmt: skip
             if clearance is not None:
-                values = np.zeros(len(self.points))
-                values[side.points] = clearance(self.points[side.points])
-                contribution += matrix @ values / weight
-        return contribution
+                contributions.append(matrix[:, side.points] @ (factor * clearance(self.points[side.points])))
+        if config.wear_depth is not None:
+            contributions.append(D @ config.wear_depth)
+        return sum(contributions[1:], contributions[0]) if contributions else None
 
 
 @record
