@@ -31,24 +31,27 @@ def lines(size):
 
 
 def surface(make, size):
-    """Facets (n, n_nodes, dim) and a point a third of a facet off the middle of each, both in any order."""
+    """Return facets (n, n_nodes, dim) and query points (n, dim), both in random order.
+
+    The query points lie about a third of a facet length from the middle of each facet.
+    """
     rng, corners = np.random.default_rng(0), make(size)
     off = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)[:, None] * np.array([0.3, 0.2, 0.1])[: corners.shape[2]]
     return np.ascontiguousarray(rng.permutation(corners)), rng.permutation(corners.mean(axis=1) + off)
 
 
 def works(size):
-    (quad4, on_quad4), (tri3, on_tri3), (line2, on_line2) = (
+    (quad4, quad4_queries), (tri3, tri3_queries), (line2, line2_queries) = (
         surface(make, size) for make in (quadrangles, triangles, lines)
     )
     middles, middles_2d = quad4.mean(axis=1), line2.mean(axis=1)
     tree, tree_2d = cKDTree(middles), cKDTree(middles_2d)
-    return len(on_quad4), {
-        "quad4": lambda: closest(on_quad4, quad4),
-        "tri3": lambda: closest(on_tri3, tri3),
-        "line2": lambda: closest(on_line2, line2),
+    return len(quad4_queries), {
+        "quad4": lambda: closest(quad4_queries, quad4),
+        "tri3": lambda: closest(tri3_queries, tri3),
+        "line2": lambda: closest(line2_queries, line2),
         "cKDTree, build 2D": lambda: cKDTree(middles_2d),
-        "cKDTree, query 2D": lambda: tree_2d.query(on_line2),
+        "cKDTree, query 2D": lambda: tree_2d.query(line2_queries),
         "cKDTree, build": lambda: cKDTree(middles),
-        "cKDTree, query": lambda: tree.query(on_quad4),
+        "cKDTree, query": lambda: tree.query(quad4_queries),
     }

@@ -212,7 +212,7 @@ class AdaptiveStudy(Report):
         ):
             if np.isfinite(errors[name]).any():
                 ax.plot(n_dofs, errors[name], style, ms=4, lw=1.0, label=label)
-        ax.axhline(self.tolerance, color="black", ls="--", lw=1.0, label="requested")
+        ax.axhline(self.tolerance, color="black", ls="--", lw=1.0, label="tolerance")
         labels = ("degrees of freedom", "relative error [-]")
         format_axes(ax, f"Error of the {title(self.quantity)}", labels, scales=("plain log", "log"))
 

@@ -501,6 +501,6 @@ def contact_zones(
     start = "axis" if first.measured_from_axis else "middle of the first contact"
     distance = axis_label(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
-    axes.set_title(title or f"Contact '{pair}' against the load", pad=16, fontsize="medium")
+    axes.set_title(title or f"States of the nodes of contact '{pair}' in each load step", pad=16, fontsize="medium")
     _axes.outer_legend(axes, 3)
     return axes

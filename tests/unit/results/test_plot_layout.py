@@ -77,6 +77,7 @@ def test_zones_say_what_closed_nodes_do(friction, word):
     named = {text.get_text() for text in ax.get_legend().get_texts()}
     assert word in named
     assert not {"closed", "sticking"} - {word} & named
+    assert ax.get_title() == "States of the nodes of contact 'floor' in each load step"
 
 
 @pytest.mark.parametrize("given", ["N", "N/mm"])
