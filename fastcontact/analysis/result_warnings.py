@@ -531,10 +531,6 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
     length, opposite = (facet_length(surface, pair.points) for surface in (side, primary))
     if length > (1.0 + WARNING_RATIO) * opposite:
         return f"use facets of '{group}' that are at most as large as the opposite ones"
-    if side.order == 2 and pair.points.shape[1] == 2 and getattr(pair, "multipliers", "") == "dual":
-        # Errors of pressures on a heated shrink fit were 0.11 to 0.17, and with standard multipliers at most 0.002. At sharp
-        # edges standard multipliers increase them.
-        return 'use multipliers="standard" if the contact has no sharp edges'
     return f"use smaller facets of both '{group}' and '{primary.group}'"
 
 

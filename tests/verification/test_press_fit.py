@@ -70,6 +70,15 @@ def test_meshes_that_do_not_match_converge_as_fast_with_mortar():
 
 
 @pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("multipliers", ["dual", "standard"])
+@pytest.mark.parametrize("kind", ["clearance", "clearance_primary"])
+def test_pressures_of_clearances_are_those_of_overlapping_meshes(kind, multipliers, swap):
+    """A clearance is measured along the normals of the surface, of which a node sees the components along its own."""
+    _, last = quarter("quad8", 10, 16, "mortar", swap, multipliers=multipliers, **{kind: -INTERFERENCE})
+    assert last.contact["fit"].pressure == pytest.approx(LAME.pressure, rel=5e-3)
+
+
+@pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("smooth", [False, True])
 def test_continuous_pressures_follow_the_circles(smooth, swap):
     """The parabolas of facets of unequal length deviate from each other, if not smoothed."""
