@@ -234,7 +234,7 @@ REFUSED = {
         (lambda: fc.Criteria(max_geometry_updates=2.5), "max_geometry_updates = 2.5 must be a whole number >= 0"),
         (lambda: fc.Criteria(geometry_updates=1.5), "geometry_updates = 1.5 must be None or a whole number >= 0"),
         (lambda: fc.Criteria(max_active_set_iterations=9.5), "max_active_set_iterations = 9.5 must be a whole number >= 1"),
-        (lambda: fc.Ramp([np.float64(0.5), np.float64(0.2)]), r"must ascend, not \[0\.5, 0\.2\]"),
+        (lambda: fc.Ramp([np.float64(0.5), np.float64(0.2)]), r"must be strictly increasing, not \[0\.5, 0\.2\]"),
         (lambda: fc.Model("a.med", "3d"), "the argument mesh of Model must be a Mesh, not the string 'a.med'"),
         (lambda: fc.Criteria(keep_pairing=True, geometry_updates=2), "keep_pairing excludes geometry_updates = 2"),
         (lambda: fc.Criteria(friction_while_touching=0), "friction_while_touching = 0 must be above 0"),

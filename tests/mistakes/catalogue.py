@@ -105,7 +105,7 @@ CASES = [
     ("fractional number of load steps", "steps = 20", "steps = 2.5",
      r"case\.toml: the value of 'ramp\.steps' must be of type int, not 2\.5"),
     ("ramp runs backwards", "steps = 20", "table = [[0.0, 0.0], [2.0, 1.0], [1.0, 1.0]]",
-     r"the table of the ramp needs at least two points with ascending instants"),
+     r"the table of the ramp needs at least two points with strictly increasing load factors"),
     ("ramp is not a table", "steps = 20", "table = [1.0, 2.0]",
      r"case\.toml: 'ramp\.table' must be a list of pairs \[instant, multiplier of the loads\]"),
     ("unknown theory", 'kind = "hertz_point"', 'kind = "hertz_pont"',
