@@ -107,7 +107,7 @@ CASES = [
     ("ramp runs backwards", "steps = 20", "table = [[0.0, 0.0], [2.0, 1.0], [1.0, 1.0]]",
      r"the table of the ramp needs at least two points with strictly increasing load factors"),
     ("ramp is not a table", "steps = 20", "table = [1.0, 2.0]",
-     r"case\.toml: 'ramp\.table' must be a list of pairs \[instant, multiplier of the loads\]"),
+     r"case\.toml: 'ramp\.table' must be a list of pairs \[load factor, multiplier of the loads\]"),
     ("unknown theory", 'kind = "hertz_point"', 'kind = "hertz_pont"',
      r"case\.toml: unknown theory\.hertz\.kind 'hertz_pont': did you mean 'hertz_point' or 'hertz_box' or 'hertz_line'\?"),
     ("theory of an unknown contact pair", "[theory.hertz]", "[theory.herts]",
