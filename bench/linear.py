@@ -94,7 +94,9 @@ def sphere(dofs: int) -> fc.Model:
 
 def bytes_per_iteration(solver: Amg) -> int:
     """Return what one iteration must read of matrices at least: K once, levels and prolongators as the cycle does."""
-    cycle_bytes = 2 * DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
+    cycle_bytes = (
+        2 * DEGREE * sum(level.A.nbytes + level.inverse_diagonal.nbytes for level in solver.hierarchy.levels[:-1])
+    )
     transfer_bytes = 2 * sum(level.P.nbytes for level in solver.hierarchy.levels if level.P is not None)
     K = solver.K.scaled
     return K.nbytes + (0 if K.low is None else K.low.nbytes) + cycle_bytes + transfer_bytes

@@ -41,7 +41,7 @@ log = logging.getLogger("fastcontact")
 # if `max_geometry_updates` is less than twice as large; without rounding, `test_equilibrium_is_found_in_space` fails.
 UPDATES_BEFORE_ROUNDING = 25
 # Safety factor for the contraction of changes by the next solution, which is estimated from the last Newton step. With 0.03,
-# steps are omitted too early: random models 9 and 14 take 4 pairings instead of 2.
+# steps are omitted too early: random models 9 and 14 take 4 pairings (2 with 3).
 SAFETY = 3.0
 
 

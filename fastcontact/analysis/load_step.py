@@ -88,7 +88,7 @@ def _end_of_step(step: StepContext, solution: StepEquilibrium, iterations: dict[
     solution : StepEquilibrium
         The converged equilibrium.
     iterations : dict
-        Numbers of iterations, for `StepResult.iterations`; it is modified.
+        Numbers of iterations and further data for `StepResult.iterations`; it is modified.
     """
     problem, start, load = step.problem, step.state, step.load
     settled, u, balance, temperatures = solution.settled, solution.u, solution.balance, solution.temperatures
@@ -100,7 +100,8 @@ def _end_of_step(step: StepContext, solution: StepEquilibrium, iterations: dict[
     if problem.bodies is not None and solution.terms is not None:
         bodies = solution.terms.bodies_at(u)
         end = replace(end, history=bodies.history)
-        # In the first step, which begins without a history, the path is unknown.
+        # The error of a step is estimated as the change if the step were halved, which requires the path of the
+        # displacements. In the first step, which begins without a history, the path is unknown.
         if problem.bodies.halving_estimates_error and load.rise is None and start.history:
             displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
             size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
@@ -119,7 +120,8 @@ def _end_of_step(step: StepContext, solution: StepEquilibrium, iterations: dict[
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and settled is not None and (rigid := settled.iterate.rigid) is not None:
-        # This scale may be round-off relative to the contact forces. Without loads it is zero, and they are round-off.
+        # The scale may be round-off relative to the contact forces, which then replace it. Without loads it is zero, and the
+        # contact forces are round-off.
         scale = end.largest_rigid_force
         report = problem.floating_bodies.report(rigid, scale and max(scale, end.largest_force))
         forces = settled.constraints, settled.solution.multiplier
@@ -160,8 +162,8 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         largest_force=max(state.largest_force, largest(load_as_force.force)),
     )  # fmt: skip
     if problem.extrapolates:
-        # For nonlinear bodies, both the loads and the motions of rigid obstacles determine the extrapolation. The state at
-        # rest is the first of the extrapolated states.
+        # For nonlinear bodies, both the loads and the motions of rigid obstacles determine the extrapolation. The first
+        # state of the extrapolation is the state at rest, without loads.
         quantities = [load.lift, load_as_force.force, *(() if problem.bodies is None else load.obstacles.values())]
         extrapolation = state.extrapolation
         if not (extrapolation.loads or state.u.any()):
@@ -263,7 +265,7 @@ def recover(
     reaction : ndarray (n_dofs of the mesh,)
         Reactions [force].
     iterations : dict
-        Numbers of iterations, see `StepResult`.
+        Numbers of iterations and further data, see `StepResult.iterations`.
     bodies : DeformedBodies, optional
         The nonlinear bodies at the end of the step; None if bodies are linear.
     """
@@ -275,7 +277,7 @@ def recover(
         loads_by_kind[name] = [load for load in problem.model.loads if isinstance(load, kind)]
     factors = {name: problem.factors(parts, end.instant) for name, parts in loads_by_kind.items()}
     iterations |= {f"{name}_factors": values for name, values in factors.items() if values}
-    heat = None if end.rise is None else problem.model.reference_temperature + end.rise
+    temperature = None if end.rise is None else problem.model.reference_temperature + end.rise
     if points := problem.reference_points:
         iterations["reference_reactions"] = reference_reactions(problem.model, points, reaction, u)
     if sections:
@@ -284,10 +286,10 @@ def recover(
         stress = recovery.nodal_average(mesh, bodies.stress, problem.sides)
     else:
         offset, field = None, problem.field
-        if factors["temperature"] or factors["initial"] or heat is not None:
-            offset = problem.model.stress_offset(factors["temperature"], factors["initial"], field, heat)
-        materials = field.moduli, field.moduli_rows, u, field.treatment
-        stress = nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
+        if factors["temperature"] or factors["initial"] or temperature is not None:
+            offset = problem.model.stress_offset(factors["temperature"], factors["initial"], field, temperature)
+        arguments = field.moduli, field.moduli_rows, u, field.treatment
+        stress = nodal_stress(mesh, problem.model.kinematics, *arguments, problem.sides, offset)
     by_material = None
     if len(problem.sides.points):
         materials_of_cells = np.concatenate(list(problem.field.distinct_materials.values()))
@@ -297,5 +299,5 @@ def recover(
         index, end.instant, u.copy(), stress, equivalent, von_mises_signed(stress, equivalent), reaction, contact,
         iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
-        temperature=heat, units=units and units_of_results(units, problem.model.kinematics),
+        temperature=temperature, units=units and units_of_results(units, problem.model.kinematics),
     )  # fmt: skip

@@ -2,10 +2,10 @@
 
 A node that belongs to several pairs behaves like a node of one pair that contains all their facets. Its constraints are
 linearly dependent: they determine only the sum of their forces, and they cannot all be eliminated. They are therefore
-replaced by their mean. Its area is the sum of their areas, so that penalties add up, and its coefficient of friction is the
-mean. Each pair carries a fraction of the force that is proportional to its area, so that the pressures are equal. If the
-clearances at one node differ, only the constraint with the smallest one can close. Constraints with a coupled normal
-compliance or with different clearances are not merged.
+replaced by their weighted mean. Their stiffnesses add up if they are compliant, and the coefficient of friction is the mean.
+Each pair carries a fraction of the force that is proportional to its area, so that the pressures are equal. If the gaps at
+one node differ, only the constraint with the smallest gap can close, unless it is compliant. Constraints with a coupled
+normal compliance or with different gaps are not merged.
 
 Two nodes at the ends of a periodic part are also regarded as one node, whose gap is the area-weighted mean of both gaps.
 Tangents at the second end are rotated to the first one before they are compared.
@@ -37,7 +37,7 @@ class SharedNodes:
     ----------
     representative : ndarray of int (m,)
         The representative that replaces each constraint in the solution; usually the constraint itself.
-    behind : ndarray of int (k,)
+    behind : ndarray of int (n_behind,)
         Constraints that cannot close, because others have a smaller gap.
     normal_fraction, tangential_fraction : ndarray (m,)
         Fraction of each constraint in the normal and in the tangential force of its representative [-].
@@ -70,7 +70,7 @@ class SharedNodes:
 
     @cached_property
     def _sums(self) -> csr_array:
-        """Matrix (m, m) of ones that sums values over the constraints of each representative."""
+        """Matrix (m, m) of zeros and ones whose products are sums over the constraints of each representative."""
         m = len(self.representative)
         return csr_array((np.ones(m), (self.representative, np.arange(m))), shape=(m, m))
 
@@ -79,13 +79,16 @@ class SharedNodes:
         return np.asarray(self._sums @ values)
 
     def merged_constraints(self, constraints: StackedConstraints) -> Constraints:
-        """Return constraints of which only the representatives, with the areas of all they represent, can close."""
+        """Return constraints of which only the representatives can close.
+
+        Each has the mean gap, the mean slips and the total stiffness of the constraints that it represents.
+        """
         merged = {
             "B": csr_array(self._sums @ scaled(constraints.B, self.normal_fraction)),
             "gap0": self.summed(self.normal_fraction * constraints.gap0),
             "tangents": self._tangents(constraints),
             "equality": constraints.equality & ~self.redundant,
-            "slip0": self._mean(constraints.slip0.T, self.tangential_fraction).T,
+            "slip0": self._weighted_sum(constraints.slip0.T, self.tangential_fraction).T,
             "friction": self.summed(self.normal_fraction * constraints.friction),
         }
         stiffness = _stiffness(constraints.softness)
@@ -95,7 +98,7 @@ class SharedNodes:
         if constraints.softness[1:].any():
             finite, weight = np.isfinite(stiffness[1]), np.ones(len(constraints))
             np.divide(stiffness[1], total[1, self.representative], out=weight, where=finite)
-            merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
+            merged["elastic_slip"] = self._weighted_sum(constraints.elastic_slip.T, weight).T
         return replace(constraints, **merged).without(self.redundant)  # type: ignore[arg-type]
 
     def _tangents(self, constraints: Constraints) -> tuple[csr_array, ...]:
@@ -106,31 +109,31 @@ class SharedNodes:
             csr_array(sum(self._sums @ scaled(T, factor) for factor, T in zip(row, tangents))) for row in products
         )
 
-    def _mean(self, components: Array, weight: Array) -> Array:
-        """Return the weighted means (m, k) of vectors over the constraints of each representative.
+    def _weighted_sum(self, components: Array, weight: Array) -> Array:
+        """Return the sums (m, k) of vectors times `weight` (m,) over the constraints of each representative.
 
-        Vectors are given by their `components` (m, k) along the tangents of their constraints, and means likewise.
+        Vectors are given by their `components` (m, k) along the tangents of their constraints, and sums likewise.
         """
         vectors = np.einsum("mk,mkd->md", weight[:, None] * components, self.frame)
         return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
     def merged_gaps(self, gaps: Array) -> Array:
         """Return the mean gaps and slips (1 + k, m) of representatives, given those of all constraints [length]."""
-        slips = self._mean(gaps[1:].T, self.tangential_fraction).T
+        slips = self._weighted_sum(gaps[1:].T, self.tangential_fraction).T
         return np.vstack([self.summed(self.normal_fraction * gaps[0]), slips])
 
     def of_representatives(
-        self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
+        self, constraints: Constraints, gap: Array, normal: Array, tangential: Array, closing: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Return four quantities of representatives, given those of all constraints.
 
-        They are gaps (m,) [length], normal forces (m,) and tangential forces (m, dim) [force], and the tangential relative
-        displacements (m, dim) that close gaps [length].
+        They are gaps (m,) [length], the `normal` (m,) and `tangential` (m, dim) forces [force], and the tangential part
+        `closing` (m, dim) of the relative displacements that close the gaps [length].
         """
         tangents = np.stack(constraints.directions, axis=1)
-        weighted = (traction, np.ones(len(gap))), (closing, self.tangential_fraction)
-        means = (self._mean(np.einsum("md,mkd->mk", vectors, tangents), weight) for vectors, weight in weighted)
-        forces, slips = (np.einsum("mk,mkd->md", along, tangents) for along in means)
+        weighted = (tangential, np.ones(len(gap))), (closing, self.tangential_fraction)
+        sums = (self._weighted_sum(np.einsum("md,mkd->mk", vectors, tangents), weight) for vectors, weight in weighted)
+        forces, slips = (np.einsum("mk,mkd->md", along, tangents) for along in sums)
         return self.summed(self.normal_fraction * gap), self.summed(normal), forces, slips
 
     def with_distributed_forces(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
@@ -161,7 +164,7 @@ class SharedNodes:
 
 
 def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface]) -> Array:
-    """Return the tangents (m, k, dim) [-] of constraints, rotated to the first end at the second end of a periodic part."""
+    """Return the tangents (m, k, dim) of constraints [-]; those at a second periodic end are rotated to the first one."""
     m, dim = constraints.positions.shape
     frame = np.stack(constraints.directions, axis=1) if constraints.directions else np.zeros((m, 0, dim))
     for interface in interfaces:
@@ -174,7 +177,7 @@ def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterfa
 def _at_periodic_interfaces(
     constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface], behind: Indices
 ) -> Indices:
-    """Return the constraints (2, k) at the first and second nodes of periodic interfaces, both of the same pair."""
+    """Return pairs (2, k) of constraints at the first and second nodes of interfaces, both of the same contact pair."""
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
     pairs = [np.empty((2, 0), np.intp)]
@@ -237,14 +240,14 @@ def _fractions(constraints: StackedConstraints, representative: Indices) -> tupl
 
 def _areas(constraints: StackedConstraints) -> Array:
     """Return the area of each constraint (m,), NaN without one [area]."""
-    pairs = constraints.parts.values()
-    return np.concatenate([np.full(len(pair), np.nan) if pair.areas is None else pair.areas for pair in pairs])
+    parts = constraints.parts.values()
+    return np.concatenate([np.full(len(part), np.nan) if part.areas is None else part.areas for part in parts])
 
 
 def _nodes(constraints: StackedConstraints) -> Indices:
     """Return the node of each constraint (m,), -1 without one or where a compliance couples it with others."""
-    pairs = constraints.parts.values()
-    nodes = [np.full(len(pair), -1) if pair.nodes is None or pair.coupled else pair.nodes for pair in pairs]
+    parts = constraints.parts.values()
+    nodes = [np.full(len(part), -1) if part.nodes is None or part.coupled else part.nodes for part in parts]
     return np.concatenate(nodes).astype(np.intp)
 
 

@@ -27,8 +27,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 # Forcing term of iterative solutions: ratio of the relative residual to the last relative change of the displacements, or to
 # the last relative residual if that is smaller. More accurate solutions would not help, because the error of contact
 # detection is as large as this change. The relative residual of the first solution of a step is NOTABLE, or this fraction of
-# it in a step that is extrapolated from earlier ones. With 0.3, "nu 0.499" takes 12 pairings instead of 6, and with 0.003
-# 146 iterations instead of 109 (robustness table, 3 000 unknowns).
+# it in a step that is extrapolated from earlier ones. With 0.3, "nu 0.499" takes 12 pairings (6 with 0.03), and with 0.003
+# it takes 146 iterations (109 with 0.03; `fastcontact bench robustness`, 3 000 unknowns).
 RESIDUAL = 0.03
 # Number of geometry updates, or of Newton iterations, within which changes must decrease. With 40,
 # `test_noise_is_found_soon_and_measured` fails, and with 3, `test_a_side_cut_in_several_is_what_it_is_whole`.

@@ -1,9 +1,11 @@
 """Iterate the wear of a load step: it depends on the contact pressures, which depend on the worn geometry.
 
-By Archard's law, the wear depth of a step increases with the pressure at its end. This dependence is a compliance of the
-contact constraints, with which the equilibrium is solved. Its slope, half the wear coefficient times the sliding distance, is
-that of the previous solution, so that a few solutions suffice. The depth thus results from the mean of the pressures at the
-beginning and at the end of the step (trapezoidal rule), and it is part of the geometry at the end of the step.
+By Archard's law, the wear depth of a step is the wear coefficient times the integral of the pressure over the slip. Without
+friction, the integral is the mean of the pressures at the beginning and at the end of the step (trapezoidal rule) times the
+sliding distance; with friction, it is `ContactResult.sliding_load`. The derivative of the depth with respect to the pressure
+at the end of the step is therefore half the wear coefficient times the sliding distance. With this derivative, evaluated at
+the previous solution, wear is a compliance of the contact constraints, so that a few solutions of the equilibrium suffice.
+The depth is part of the geometry at the end of the step.
 """
 
 from __future__ import annotations
@@ -27,30 +29,35 @@ def newton_with_wear(begin: StepContext, before: StepEquilibrium | None = None) 
     """Return the equilibrium of a load step, including the wear of this step; for parameters see `newton`.
 
     The iteration also ends if the error of the depths no longer decreases. With friction this may happen where nodes open,
-    because the work of friction and the wear then change discontinuously. The next step begins with the corrected depths.
+    because the work of friction and the wear then change discontinuously. The next step begins with the depths that
+    belong to the last equilibrium.
     """
     problem, start = begin.problem, begin.state
     sides = {name: pair.secondary for name, pair in problem.pairs.items() if pair.options.wear is not None}
     if not sides:
         return newton(begin, before)
-    earlier = {name: start.worn.get(name, Worn.nothing(len(side.points))).depth for name, side in sides.items()}
+    depth_at_start = {name: start.worn.get(name, Worn.nothing(len(side.points))).depth for name, side in sides.items()}
     points, errors = problem.model.mesh.points, list[float]()
-    wear = {name: WearCompliance.constant(earlier[name], points[side.points]) for name, side in sides.items()}
+    wear = {name: WearCompliance.constant(depth_at_start[name], points[side.points]) for name, side in sides.items()}
     wear |= {} if before is None else before.wear
+    equilibrium = before
     while True:
         begin = replace(begin, state=replace(start, wear=wear))
-        before = newton(begin, before)
-        wear = {name: _wear_of_solution(begin, before, name) for name in sides}
-        depth = max(largest(after.depth - earlier[name]) for name, after in wear.items())
+        equilibrium = newton(begin, equilibrium)
+        wear = {name: _wear_of_solution(begin, equilibrium, name) for name in sides}
+        largest_depth = max(largest(after.depth - depth_at_start[name]) for name, after in wear.items())
         errors.append(
             max(linearisation_error(problem.pairs[name], begin.state.wear[name], after) for name, after in wear.items())
         )
-        if errors[-1] <= max(problem.criteria.relative * depth, start.gap_round_off):
+        if errors[-1] <= max(problem.criteria.relative * largest_depth, start.gap_round_off):
             break
         if len(errors) > WINDOW and min(errors[-WINDOW:]) > DECLINE * min(errors[:-WINDOW]):
-            log.info("wear depths do not converge: they still change by %.1e of the largest one", errors[-1] / depth)
+            log.info(
+                "wear depths do not converge: they still change by %.1e of the largest in this step",
+                errors[-1] / largest_depth,
+            )
             break
-    return replace(before, wear=wear)
+    return replace(equilibrium, wear=wear)
 
 
 def _wear_of_solution(step: StepContext, equilibrium: StepEquilibrium, name: str) -> WearCompliance:

@@ -333,7 +333,7 @@ def _check_terms(where: str, terms: Any) -> None:
 
 
 def ramp_points(table: list[Any], where: str = "ramp.table") -> Table:
-    """Return the pairs of instant and load multiplier [-] of a ramp.
+    """Return the pairs of load factor and load multiplier [-] of a ramp.
 
     Raises CaseError if `table` is not a list of such pairs.
     """
@@ -341,5 +341,5 @@ def ramp_points(table: list[Any], where: str = "ramp.table") -> Table:
     if not rows or not all(
         isinstance(row, list) and [isinstance(v, NUMBER) for v in row] == [True] * 2 for row in rows
     ):
-        raise CaseError(f"'{where}' must be a list of pairs [instant, multiplier of the loads]")
+        raise CaseError(f"'{where}' must be a list of pairs [load factor, multiplier of the loads]")
     return tuple((float(t), float(v)) for t, v in table)

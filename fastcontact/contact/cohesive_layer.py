@@ -1,9 +1,10 @@
 """Cohesive layers between the sides of contact pairs, as equality constraints whose compliance follows a traction law.
 
-The law is linearised in each pairing: by the secant where the layer unloads or reloads, and by a nearly constant traction
-along the separation where it softens. At right angles to the separation, the derivative of the traction is the secant. The
-constraints are therefore formulated along the separation and at right angles to it. The matrices then remain positive
-definite, and the iteration over pairings converges to every state that is stable under prescribed displacements.
+The law is linearised each time the contact surfaces are paired: by the secant where the layer unloads or reloads, and by a
+nearly constant traction along the separation where it softens. At right angles to the separation, the derivative of the
+traction is the secant. The constraints are therefore formulated along the separation and at right angles to it. The stiffness
+matrix of bodies and layer then remains positive definite, and every state that is stable under prescribed displacements can
+be a limit of the iteration over pairings.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.round_off import DIFFERENCE_STEP, SINGLE_PRECISION, TINY
 
-# Stiffness of the linearised layer where it softens, relative to that of the intact layer. It is approximately the ratio of
-# the magnitudes of the two slopes of the default law. With a smaller ratio, the iteration for a beam glued at its nodes does
-# not converge.
+# Stiffness of the linearised layer where it softens, relative to that of the intact layer. It must be positive, and is
+# approximately the ratio of the magnitudes of the falling and the rising slope of the default law. With a smaller ratio, the
+# iteration for a beam glued at its nodes does not converge.
 SOFTENING_SLOPE = INITIATION_RATIO
 # Stiffness per area of adhering sides that are pressed together, relative to the modulus of the bodies over the length of
 # the shortest facet. The penetration is then about a hundredth of the elastic deformation of a facet. With 1,
@@ -48,7 +49,7 @@ class CohesiveLayer:
     axes : ndarray (1 + k, 1 + k, m)
         Symmetric orthogonal matrices from components along the normal and the tangents to those along the axes of the
         equations [-].
-    zero_traction : ndarray (1 + k, m)
+    unstressed_separation : ndarray (1 + k, m)
         Separation along these axes at which the linearised traction vanishes [length].
     compression : float
         Stiffness in compression, relative to that of the intact layer [-].
@@ -61,7 +62,7 @@ class CohesiveLayer:
     damage: Array
     separation: Array
     axes: Array
-    zero_traction: Array
+    unstressed_separation: Array
     compression: float
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
@@ -74,8 +75,8 @@ class CohesiveLayer:
 
         `constraints` are the equations of the layer.
         """
-        gaps = (constraints.gap0 + constraints.B @ u).reshape(self.zero_traction.shape)
-        separation = np.einsum("abm,bm->am", self.axes, gaps + self.zero_traction)
+        gaps = (constraints.gap0 + constraints.B @ u).reshape(self.unstressed_separation.shape)
+        separation = np.einsum("abm,bm->am", self.axes, gaps + self.unstressed_separation)
         # The tangential rows of broken points are zero, so that `separation` does not contain their slips.
         opening, *slips = np.where(self.damage < 1.0, separation, self.separation)
         before = self.initial_bond
@@ -91,14 +92,15 @@ class CohesiveLayer:
 
 @record
 class Softening:
-    """Derivatives of the gaps of the linearised law with respect to the separations at which it is linearised.
+    """Change of the gaps of the equations with the separations at which the law is linearised.
 
     Attributes
     ----------
     B : csr_array ((1 + k) m, n_dofs)
         Derivatives of the separations along the axes of the equations with respect to the displacements [-].
     correction : ndarray (1 + k, 1 + k, m)
-        Derivatives of the gaps with respect to these separations, zero where the layer does not soften [-].
+        Derivatives of the gaps with respect to these separations, in addition to those at a fixed linearisation; zero where
+        the damage does not grow [-].
     """
 
     B: csr_array
@@ -113,12 +115,13 @@ class Softening:
 def cohesive_rows(
     law: CohesiveLaw, constraints: Constraints, config: Configuration, initial_gap: Array, body_stiffness: float
 ) -> Constraints:
-    """Return the equations of a cohesive layer at the points of `constraints`, which must have tangents unless it adheres.
+    """Return the equations of a cohesive layer at the points of `constraints`.
 
-    The compliance of the equations follows the traction law. A cohesive layer is free of stress at the initial gaps
-    `initial_gap` (m,) [length], whereas adhesion acts across them. Broken points may close again, with the stiffness of the
-    intact layer. The stiffness of adhering sides in compression is at least COMPRESSION_FACTOR times `body_stiffness`, the
-    modulus of the bodies over the length of the shortest facet [pressure / length].
+    The compliance of the equations follows the traction law. A layer with an irreversible law is free of stress at the
+    initial gaps `initial_gap` (m,) [length], and its constraints must have tangents. Adhesion, whose law is reversible, acts
+    across the gaps. Broken points may close again, with the stiffness of the intact layer. The stiffness of adhering sides in
+    compression is at least COMPRESSION_FACTOR times `body_stiffness`, the modulus of the bodies over the length of the
+    shortest facet [pressure / length].
     """
     assert constraints.areas is not None
     m, u, start = len(constraints), config.displacement.ravel(), config.start.ravel()
@@ -146,10 +149,10 @@ def cohesive_rows(
     secant[0, stiffened] = compression
     growing = intact & (damage > (0.0 if law.reversible else bond.damage))
     softening = growing & (1.0 - damage > SOFTENING_SLOPE)
-    axes, axis = _axes_along(np.where(softening, np.stack([np.maximum(opening, 0.0), *slips]), 0.0))
+    axes, nearest_axis = _axes_along(np.where(softening, np.stack([np.maximum(opening, 0.0), *slips]), 0.0))
     slope = secant.copy()
-    slope[axis[softening], np.flatnonzero(softening)] = SOFTENING_SLOPE
-    zero_traction = np.einsum("abm,bm->am", axes, separation) * (1.0 - secant / slope)
+    slope[nearest_axis[softening], np.flatnonzero(softening)] = SOFTENING_SLOPE
+    unstressed_separation = np.einsum("abm,bm->am", axes, separation) * (1.0 - secant / slope)
     rotation = csr_array(block_array([[diags_array(entries) for entries in row] for row in axes], format="csr"))
     gap0 = rotation @ np.concatenate([constraints.gap0 - np.where(intact, initial_gap, 0.0), *slip0])
     B = csr_array(rotation @ vstack([constraints.B, *constraints.tangents], format="csr"))
@@ -159,12 +162,12 @@ def cohesive_rows(
     correction[..., points] = np.einsum("acm,cdm,dbm->abm", Q, derivative, Q) / slope[:, None, points]
     correction[..., points] -= np.eye(len(separation))[..., None]
     no_values = np.empty(0)
-    state = bond, damage, separation, axes, zero_traction, compression
+    state = bond, damage, separation, axes, unstressed_separation, compression
     layer = CohesiveLayer(law, constraints.directions, constraints.areas, *state)
     return replace(
         constraints,
         B=B,
-        gap0=gap0 - zero_traction.ravel(),
+        gap0=gap0 - unstressed_separation.ravel(),
         equality=np.tile(intact, len(separation)),
         prescribed=np.zeros(separation.size, bool),
         softness=1.0 / (slope * law.stiffness * constraints.areas).reshape(1, -1),
@@ -173,15 +176,15 @@ def cohesive_rows(
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(separation)),
         compliance=None, tangents=(), directions=(), tied=layer, geometry=lambda *_: Softening(B, correction),
         friction=no_values, slip0=no_values, elastic_slip=no_values,
-        low_rank_compliance=no_values, branches=np.where(growing, 1 + axis, 0) + 4 * stiffened + 8 * ~intact,
+        low_rank_compliance=no_values, branches=np.where(growing, 1 + nearest_axis, 0) + 4 * stiffened + 8 * ~intact,
     ).without(np.concatenate([np.zeros(m, bool), *[~intact] * len(slip0)]))  # fmt: skip
 
 
 def _traction_derivatives(law: CohesiveLaw, separation: Array, compression: float) -> Array:
     """Return the derivatives (1 + k, 1 + k, q) of the tractions with respect to separations (1 + k, q) [-].
 
-    The damage grows with the separation. Derivatives and `compression`, the stiffness in compression, are relative to the
-    stiffness of the intact layer.
+    The damage is that of monotonic loading to these separations. Tractions and `compression`, the stiffness in compression,
+    are divided by the stiffness of the intact layer.
     """
 
     def traction(separation: Array) -> Array:
@@ -196,7 +199,7 @@ def _traction_derivatives(law: CohesiveLaw, separation: Array, compression: floa
 
 
 def _axes_along(vectors: Array) -> tuple[Array, Indices]:
-    """Return symmetric orthogonal matrices (n, n, m) that map vectors (n, m) to coordinate axes, and these axes (m,).
+    """Return symmetric orthogonal matrices (n, n, m) that map vectors (n, m) to coordinate axes, and their numbers (m,).
 
     They are Householder reflections that map each vector to the axis nearest to it, and the identity for zero vectors.
     """

@@ -154,8 +154,9 @@ class ContactSides:
         It is the negative of the motion of a rigid primary side in the step. Between two bodies, if `slip` is
         ``"symmetric"``, it is the negative of the tangential displacement that closes the gap. On curved surfaces, in
         particular at the edge of the contact, the normal of the primary side is inclined to the direction in which the gap
-        closes. A component of the closing motion would then count as slip. The gap is assumed to close along the mean normal
-        of the two sides, which is exact for two bodies that are mirror images. `directions` are k unit tangents (n, dim).
+        closes, so that without this correction a component of the closing motion would count as slip. The gap is assumed to
+        close along the mean normal of the two sides, which is exact for two bodies that are mirror images. `directions` are k
+        unit tangents (n, dim).
         """
         if isinstance(self.primary, RigidSide):
             obstacle_motion = self.rigid_motion(candidates.positions, config)
@@ -194,10 +195,11 @@ class ContactSides:
     def gaps(
         self, candidates: Candidates, pairing: Pairing, config: Configuration
     ) -> tuple[csr_array, csr_array, Array]:
-        """Return the `relative_motion` (n, n_points) of candidates, and the gaps ``gap0 + G @ u`` of smooth surfaces.
+        """Return the `relative_motion` (n, n_points) of candidates, and G and gap0 of their gaps ``gap0 + G @ u``.
 
-        The gaps consist of their derivatives G (n, n_points * dim) [-] and gap0 (n,) [length]. With smooth surfaces, the
-        candidates must have facets and reference coordinates.
+        G (n, n_points * dim) [-] contains the derivatives of the gaps with respect to the displacements, and gap0 (n,)
+        [length] includes the correction for smooth surfaces, if these are used. The candidates must then have facets and
+        reference coordinates.
         """
         motion = relative_motion(candidates, pairing, len(self.points))
         (G, gap0), added_gap = gap_rows(motion, pairing, self.points), self.added_gap(candidates, pairing, config)

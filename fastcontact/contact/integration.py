@@ -76,9 +76,10 @@ def all_nodes_carry_pressure(element: str) -> bool:
 
 
 def areas_of_rule(block: FacetBlock, points: Array, axisymmetric: bool) -> tuple[Array, Array]:
-    """Return the shape functions (n_quad, k) [-] at the points of the `fine_rule`, and their areas (n_facets, n_quad) [area].
+    """Return the shape functions (n_quad, k) [-] at the points of the `fine_rule`, and the areas (n_facets, n_quad) [area].
 
-    `points` (n_points, dim) are the coordinates of all points [length].
+    The area of a quadrature point is its weight times the `facet_measure`. `points` (n_points, dim) are the coordinates of
+    all points of the mesh [length].
     """
     xi, weights = fine_rule(block.element)
     measure = facet_measure(block.facets, block.element, points, xi, axisymmetric)
@@ -105,7 +106,7 @@ def even_at_axis(surface: Surface, points: Array) -> csr_array:
     """Return the map (m, m) from the values of a field at nodes off the axis to those at all nodes.
 
     If the end of a quadratic line lies on the axis, the integral of its shape function vanishes. The nodal force there
-    hardly depends on the value p there: divided by the area of the facet, the force is a 60th of the difference between p and
+    hardly depends on the value p there: divided by the area of the facet, the force is a 30th of the difference between p and
     the value at the other end. Errors in the forces would be amplified accordingly. A smooth field is an even function of the
     radius r. Therefore p = (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2), with the values p1 and p2 at the radii r1 and r2 of the two
     other nodes. `points` (n_points, dim) are the coordinates of all points [length]. The column of an end is empty, and all
@@ -132,8 +133,8 @@ def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
     """
     areas = np.zeros(len(side.points))
     for block in side.blocks:
-        N, measure = areas_of_rule(block, points, axisymmetric)
-        nodal_parts = measure @ N**2
-        nodal_parts *= (measure.sum(axis=1) / nodal_parts.sum(axis=1))[:, None]
+        N, dA = areas_of_rule(block, points, axisymmetric)
+        nodal_parts = dA @ N**2
+        nodal_parts *= (dA.sum(axis=1) / nodal_parts.sum(axis=1))[:, None]
         np.add.at(areas, block.local, nodal_parts)
     return areas

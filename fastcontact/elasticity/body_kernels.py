@@ -40,7 +40,11 @@ INVERTED, NO_PLANE_STRESS = 1, 2
 
 @kernel
 def _tables(dN, columns, rows):
-    """Store dN (n_q, n_nodes, dim) in `columns` (n_nodes, ...) and `rows` (..., n_nodes), beginning at 3 q for point q."""
+    """Store dN (n_q, n_nodes, dim) in `columns` (n_nodes, n_rows) and, transposed, in `rows` (3 n_q, width).
+
+    Column ``3 q + i`` of `columns`, and the same row of `rows`, contain the derivatives of all shape functions with respect
+    to the reference coordinate i at point q. Other entries are zero; `n_rows` and `width` are multiples of four.
+    """
     n_q, n_nodes, dim = dN.shape
     columns[:], rows[:] = 0.0, 0.0
     for q in range(n_q):
@@ -50,11 +54,12 @@ def _tables(dN, columns, rows):
 
 
 @kernel
-def _map(points, displacement, cells, c, columns, x, maps):
-    """Fill three rows of `maps` for each point: derivatives of positions (columns 0 to 2) and displacements (4 to 6).
+def _map(points, displacement, cells, c, columns, x, derivatives):
+    """Fill `derivatives` (n_rows, 8) with those of positions (columns 0 to 2) and of displacements (columns 4 to 6).
 
-    `columns` (n_nodes, n_rows) contains the derivatives of the shape functions, see `_tables`. The positions and
-    displacements of the nodes of cell `c` are stored in `x` (n_nodes, 8).
+    Row ``3 q + i`` belongs to point q and the reference coordinate i. `columns` (n_nodes, n_rows) contains the derivatives of
+    the shape functions, see `_tables`. The positions and displacements of the nodes of cell `c` are stored in `x` (n_nodes,
+    8).
     """
     n_nodes = cells.shape[1]
     for a in range(n_nodes):
@@ -62,19 +67,21 @@ def _map(points, displacement, cells, c, columns, x, maps):
         for i in range(points.shape[1]):
             x[a, i], x[a, 4 + i] = points[p, i], displacement[p, i]
     for row in range(0, columns.shape[1], 4):
-        tile(columns, 0, row, x, 0, 0, n_nodes, maps, row, True)
-        tile(columns, 0, row, x, 0, 4, n_nodes, maps, row, True)
+        tile(columns, 0, row, x, 0, 0, n_nodes, derivatives, row, True)
+        tile(columns, 0, row, x, 0, 4, n_nodes, derivatives, row, True)
 
 
 @kernel
-def _deformation_gradient(maps, q, dim, rows, finite, inverse, gradient, F):
-    """Fill F (3, 3) and the three rows of point q in `gradient` (n_q * 3 + 1, width); return det J.
+def _deformation_gradient(derivatives, q, dim, rows, finite, inverse, gradient, F):
+    """Fill F (3, 3) and, in `gradient` (n_q * 3 + 1, width), dN/dX at point q; return the determinant of dX/dxi.
 
-    `maps` is computed by `_map`, and `rows` by `_tables`. `inverse` (3, 4) is overwritten.
+    `derivatives` is computed by `_map`, and `rows` by `_tables`. `inverse` (3, 4) is filled with the inverse of dX/dxi. Row
+    ``3 q + i`` of `gradient` contains the derivatives of all shape functions with respect to the coordinate i.
     """
     k, identity = 3 * q, 1.0 if finite else 0.0
-    j00, j01, j02, j10, j11, j12 = maps[k, 0], maps[k, 1], maps[k, 2], maps[k + 1, 0], maps[k + 1, 1], maps[k + 1, 2]
-    j20, j21, j22 = maps[k + 2, 0], maps[k + 2, 1], 1.0 if dim == 2 else maps[k + 2, 2]
+    j00, j01, j02 = derivatives[k, 0], derivatives[k, 1], derivatives[k, 2]
+    j10, j11, j12 = derivatives[k + 1, 0], derivatives[k + 1, 1], derivatives[k + 1, 2]
+    j20, j21, j22 = derivatives[k + 2, 0], derivatives[k + 2, 1], 1.0 if dim == 2 else derivatives[k + 2, 2]
     c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
     det = j00 * c00 + j01 * c01 + j02 * c02
     factor = 1.0 / det
@@ -84,7 +91,7 @@ def _deformation_gradient(maps, q, dim, rows, finite, inverse, gradient, F):
     for a in range(0, gradient.shape[1], 4):
         tile(inverse, 0, 0, rows, k, a, 3, gradient, k, True)
     for i in range(3):
-        r, s, t = maps[k, 4 + i], maps[k + 1, 4 + i], maps[k + 2, 4 + i]
+        r, s, t = derivatives[k, 4 + i], derivatives[k + 1, 4 + i], derivatives[k + 2, 4 + i]
         for j in range(3):
             F[i, j] = r * inverse[0, j] + s * inverse[1, j] + t * inverse[2, j] + (identity if i == j else 0.0)
     return det
@@ -104,10 +111,10 @@ def _add_hoop_terms(x, N, q, gradient, F):
 
 
 @kernel
-def _remove_expansion(strain, N, cell, rise, finite, F, gradient):
+def _remove_expansion(expansion, N, cell, rise, finite, F, gradient):
     """Remove thermal expansion from F and from the shape derivatives `gradient` (3, width), in place.
 
-    `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per unit rise, with engineering shear
+    `rise` (n_points,) is the temperature rise, and `expansion` (6,) the thermal strain per unit rise, with engineering shear
     strains. Returns the thermal volume ratio and the thermal strain along z.
     """
     rise_at_point, identity = 0.0, 1.0 if finite else 0.0
@@ -116,7 +123,9 @@ def _remove_expansion(strain, N, cell, rise, finite, F, gradient):
     U, inverse = np.empty((3, 3)), np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            U[i, j] = identity + rise_at_point * strain[i] if i == j else 0.5 * rise_at_point * strain[voigt(i, j)]
+            U[i, j] = (
+                identity + rise_at_point * expansion[i] if i == j else 0.5 * rise_at_point * expansion[voigt(i, j)]
+            )
     if not finite:
         F -= U
         return 1.0, U[2, 2]
@@ -147,8 +156,10 @@ def _dilatation(F, finite, G):
 def _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A):
     """Subtract the initial-stress term delta_ik S_JL from A if `omitted` is true.
 
-    S is the second Piola-Kirchhoff stress that corresponds to ``P + (d2J_factor - pressure) G``. In compression, where
-    `d2J_factor` is negative, the contribution due to the variation of the dilatation within a cell is also subtracted.
+    G (3, 3) is dJ/dF, and A contains `d2J_factor` times the second derivative of J, which may differ from `pressure`. S is
+    the second Piola-Kirchhoff stress of the part ``P + (d2J_factor - pressure) G`` of P. In compression, where `d2J_factor`
+    is negative, the part ``d2J_factor / J`` times the dyadic product of G with itself, which is due to the variation of the
+    dilatation, is also subtracted.
     """
     for row in range(9 if omitted else 0):
         for column in range(9):
@@ -194,8 +205,8 @@ def _evaluate_point(
 ):  # fmt: skip
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress has converged.
 
-    `pressure` is due to the projected dilatation, `bulk` is the bulk modulus for the remainder, `dilatation` is J - 1, and
-    G (3, 3) is its derivative. For the other arguments, see `linearise`, `_solve_plane_stress` and `evaluate_law`.
+    `pressure` is due to the projected dilatation, and `bulk` is the bulk modulus of the unprojected `dilatation` J - 1, whose
+    derivative is G (3, 3); see `linearise`. For the other arguments, see also `_solve_plane_stress` and `evaluate_law`.
     """
     omitted = finite and geometric == 0 and tangent
     if plane_stress:
@@ -212,7 +223,7 @@ def _evaluate_point(
 
 @kernel
 def _elastic_tangent(constants, D, bulk, plane_stress):
-    """Return A (24, 12) for elastic small strains, without the projected dilatation."""
+    """Return A (24, 12) for small elastic strains, without the projected dilatation."""
     no_history, new, P, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.zeros((24, 12))
     F, G = np.zeros((3, 3)), np.empty((3, 3))
     finite, tangent, geometric = np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see `_solve_plane_stress`
@@ -224,7 +235,7 @@ def _elastic_tangent(constants, D, bulk, plane_stress):
 
 
 @kernel
-def _weigh(P, first, weight, dim, out, row):
+def _weighted_transpose(P, first, weight, dim, out, row):
     """Fill three rows of `out` (n_rows, 4), from `row` on, with `weight` times P.T; P begins at row `first` of its array.
 
     The third row is for the shape derivatives along z or, in axisymmetry, for N / r, which multiplies the radial
@@ -238,7 +249,10 @@ def _weigh(P, first, weight, dim, out, row):
 
 @kernel
 def _integrate(factors, gradient, out, row):
-    """Fill four rows of `out` (n_rows, width) with the nodal forces of all points; see `_weigh` for `factors` (3 n_q, 4)."""
+    """Fill four rows of `out` (n_rows, width) with nodal forces, integrated over the points of a cell.
+
+    `factors` (3 n_q, 4) is filled by `_weighted_transpose`.
+    """
     for a in range(0, gradient.shape[1], 4):
         tile(factors, 0, 0, gradient, 0, a, len(factors), out, row, True)
 
@@ -252,45 +266,46 @@ def _copy(source, first, out, row):
 
 
 @kernel
-def _project(polynomials, volume, gradient, dim, dilatation, G, factors, mass, projected, slopes):
+def _project(polynomials, volume, gradient, dim, dilatation, G, factors, cholesky, projected, slopes):
     """Project the dilatation of a cell onto polynomials.
 
-    G (3 n_q, 3) contains the derivatives of the `dilatation` (n_q,) with respect to F. The results are the coefficients
-    `projected` (m, 1) of the orthonormal polynomials, the Cholesky factor `mass` (m, m) of the mass matrix and, if the array
-    is not empty, the derivatives `slopes` (4 m, width) of the coefficients with respect to the displacements, four rows for
-    each polynomial.
+    G (3 n_q, 3) contains the derivatives of the `dilatation` (n_q,) with respect to F. The results are the lower
+    triangular factor `cholesky` (m, m) of the mass matrix of the `polynomials` (n_q, m), which are integrated over the cell
+    with `volume` (n_q,); the coefficients `projected` (m, 1) in the orthonormal basis that this factor defines; and, if the
+    array is not empty, the derivatives `slopes` (4 m, width) of the coefficients with respect to the displacements, four rows
+    for each polynomial.
     """
-    m = len(mass)
-    mass[:], projected[:] = 0.0, 0.0
+    m = len(cholesky)
+    cholesky[:], projected[:] = 0.0, 0.0
     for k in range(m):
         for q in range(len(volume)):
             weight = volume[q] * polynomials[q, k]
             for n in range(k + 1):
-                mass[k, n] += weight * polynomials[q, n]
+                cholesky[k, n] += weight * polynomials[q, n]
             projected[k, 0] += weight * dilatation[q]
-            _weigh(G, 3 * q, weight, dim, factors, 3 * q)
+            _weighted_transpose(G, 3 * q, weight, dim, factors, 3 * q)
         if len(slopes):
             _integrate(factors, gradient, slopes, 4 * k)
-    forward_substitute(mass, projected)
+    forward_substitute(cholesky, projected)
     for k in range(m if len(slopes) else 0):
         for n in range(k):
             for i in range(4):
                 for a in range(slopes.shape[1]):
-                    slopes[4 * k + i, a] -= mass[k, n] * slopes[4 * n + i, a]
+                    slopes[4 * k + i, a] -= cholesky[k, n] * slopes[4 * n + i, a]
         for i in range(4):
             for a in range(slopes.shape[1]):
-                slopes[4 * k + i, a] /= mass[k, k]
+                slopes[4 * k + i, a] /= cholesky[k, k]
 
 
 @kernel
-def _pressures(bulk, polynomials, mass, projected, pressure):
+def _pressures(bulk, polynomials, cholesky, projected, pressure):
     """Fill the `pressure` (n_q,) due to the projected dilatation, and return its energy."""
     m = len(projected)
     coefficients, energy = np.empty(m), 0.0
     for k in range(m):
         coefficients[k] = projected[k, 0]
         energy += 0.5 * bulk * coefficients[k] ** 2
-    back_substitute(mass, coefficients)
+    back_substitute(cholesky, coefficients)
     for q in range(polynomials.shape[0]):
         pressure[q] = 0.0
         for k in range(m):
@@ -304,7 +319,8 @@ def _store_tangent(gradient, q, weight, A, dim, n, left, right):
 
     The weighted shape derivatives are stored in `left` (3 n_q, width). The products of the blocks (i, k) of A and the shape
     derivatives, for the pairs i <= k of displacement components, are stored in `right` (n_pairs * (3 n_q + 1), width). If dim
-    is 2, rows and columns of A are moved first, because the third shape derivative multiplies the radial displacement.
+    is 2, the row and the column zz of A are first moved to xz, because the third shape derivative multiplies the radial
+    displacement.
     """
     step, pair = len(left) + 1, 0
     for e in range(9 if dim == 2 else 0):
@@ -378,27 +394,28 @@ def _assemble(local, slots, in_part, data):
 def linearise(
     points, cells, N, dN, weights, polynomials, axisymmetric, plane_stress, finite, geometric, displacement,
     constants, moduli, bulk, expansion, rise,
-    material, old, slots, owner, part, elastic, data, force, new, stress, energy,
+    material, old, slots, owner, part, has_elastic, data, force, new, stress, energy,
 ):  # fmt: skip
     """Add the tangent to `data` (n_blocks, dim, dim) and forces to `force` (n_points, dim), in the rows of nodes of `part`.
 
     For cells whose first node belongs to the part, this fills the history `new` (n_cells, n_q, 9), the Cauchy `stress`
     (n_cells, n_q, n_components) and `energy` (n_cells, 2), the elastic energy and the plastic work. `bulk` (n_materials, 2)
-    contains the bulk moduli of the dilatation projected onto `polynomials` (n_q, m) and of its remainder. A temperature
-    `rise` (n_points,), which may be empty, causes the strains `expansion` (n_materials, 6) per unit rise.
+    contains the two parts of the bulk modulus: the first multiplies the dilatation projected onto `polynomials` (n_q, m), and
+    the second the unprojected dilatation at each point. A temperature `rise` (n_points,), which may be empty, causes the
+    strains `expansion` (n_materials, 6) per unit rise.
 
     With ``geometric = 2``, the tangent is complete. With 1, the second derivative of J is omitted. With 0, the initial-stress
     stiffness and, in tension, the second derivative of J are omitted, so that the tangent is positive semidefinite. If `data`
-    is empty, no tangent is computed. If `elastic` is true, `data` must contain the elastic tangent of small strains, and the
-    difference from this tangent is added at points with plastic flow. Returns a status code and the number of the cell that
-    caused it, or 0 and -1.
+    is empty, no tangent is computed. If `has_elastic` is true, `data` must already contain the elastic tangent of small
+    strains, and only the difference from it is added, at points with plastic flow. Returns a status code and the number of
+    the cell that caused it, or 0 and -1.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
-    full_tangent, width, n_pairs = tangent and not elastic, -(-n_nodes // 4) * 4, dim * (dim + 1) // 2
+    full_tangent, width, n_pairs = tangent and not has_elastic, -(-n_nodes // 4) * 4, dim * (dim + 1) // 2
     columns, rows = np.empty((n_nodes, -(-3 * n_q // 4) * 4)), np.empty((3 * n_q, width))
     _tables(dN, columns, rows)
-    x, maps, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
+    x, derivatives, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
     gradient, volume, forces = np.empty((3 * n_q + 1, width)), np.empty(n_q), np.empty((4, width))
     F, G, Fs, Gs = np.empty((3, 3)), np.empty((3, 3)), np.empty((3 * n_q, 3)), np.empty((3 * n_q, 3))
     dilatation, strain_z, pressure = np.empty(n_q), np.zeros(n_q), np.empty(n_q)
@@ -406,21 +423,24 @@ def linearise(
     before, after, factors = np.zeros(9), np.zeros(9), np.zeros((3 * n_q, 4))
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     local = np.empty((n_pairs * width, width))
-    mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if full_tangent else 0, width))
-    # Numba counts array references by atomic operations where views are created, and in functions that call others in
-    # branches. This would take as long as the law of the first invariant itself. Therefore, the law is called directly here.
+    cholesky, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if full_tangent else 0, width))
+    # Numba counts references to arrays by atomic operations where views are created, and in functions that call others in
+    # branches. In `_evaluate_point`, this would take as long as the law of the first invariant itself, which is therefore
+    # called directly in this function.
     row, law, D, direct, yields, elastic_tangent = -1, constants[0], moduli[0], False, False, A
     for c in range(n_cells):
         if not find_owned(cells, c, owner, part, in_part):
             continue
-        _map(points, displacement, cells, c, columns, x, maps)
+        _map(points, displacement, cells, c, columns, x, derivatives)
         for q in range(n_q):
-            volume[q] = weights[q] * _deformation_gradient(maps, q, dim, rows, finite, inverse, gradient, F)
+            volume[q] = weights[q] * _deformation_gradient(derivatives, q, dim, rows, finite, inverse, gradient, F)
             if axisymmetric:
                 volume[q] *= _add_hoop_terms(x, N, q, gradient, F)
             if len(rise):
-                strain, rows_of_q = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
-                ratio, strain_z[q] = _remove_expansion(strain, N[q], cells[c], rise, finite, F, gradient[rows_of_q])
+                expansion_of_q, rows_of_q = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
+                ratio, strain_z[q] = _remove_expansion(
+                    expansion_of_q, N[q], cells[c], rise, finite, F, gradient[rows_of_q]
+                )
                 volume[q] *= ratio
             dilatation[q] = _dilatation(F, finite, G)
             if finite and not dilatation[q] > -1.0:
@@ -430,15 +450,15 @@ def linearise(
         pressure[:] = 0.0
         stored, dissipated, bulk_mean, n_factors = 0.0, 0.0, bulk[material[c, 0], 0], 0
         if bulk_mean > 0.0:
-            _project(polynomials, volume, gradient, dim, dilatation, Gs, factors, mass, projected, slopes)
-            stored += _pressures(bulk_mean, polynomials, mass, projected, pressure)
+            _project(polynomials, volume, gradient, dim, dilatation, Gs, factors, cholesky, projected, slopes)
+            stored += _pressures(bulk_mean, polynomials, cholesky, projected, pressure)
         for q in range(n_q):
             if material[c, q] != row:
                 row = material[c, q]
                 law, D = constants[row], moduli[row]
                 direct = finite and geometric == 2 and not plane_stress and law[0] == INVARIANTS and law[4] == 0.0
                 yields = law[0] == PLASTIC and not plane_stress
-                if tangent and elastic and law[0] == PLASTIC:
+                if tangent and has_elastic and law[0] == PLASTIC:
                     elastic_tangent = _elastic_tangent(law, D, bulk[row, 1], plane_stress)
             for e in range(9 if len(new) else 0):
                 before[e] = old[c, q, e]
@@ -465,12 +485,12 @@ def linearise(
                     return NO_PLANE_STRESS, c
                 dissipated += volume[q] * after[7]
             stored += volume[q] * density
-            _weigh(P, 0, volume[q], dim, factors, 3 * q)
+            _weighted_transpose(P, 0, volume[q], dim, factors, 3 * q)
             flows = not direct and after[6] > before[6]
-            for e in range(9 if tangent and elastic and flows else 0):
+            for e in range(9 if tangent and has_elastic and flows else 0):
                 for k in range(9):
                     A[e, k] -= elastic_tangent[e, k]
-            if tangent and (flows or not elastic):
+            if tangent and (flows or not has_elastic):
                 _store_tangent(gradient, q, volume[q], A, dim, n_factors, left, right)
                 n_factors += 3
             if in_part[0]:

@@ -109,7 +109,7 @@ class Centrifugal(InertiaLoad):
     origin, direction : (float, float, float)
         A point on the axis [length], and a vector along the axis [-].
     ramp : tuple, optional
-        Points (instant, multiplier) of the ramp of the force, which is proportional to the square of the speed.
+        Points (load factor, multiplier) of the ramp of the force, which is proportional to the square of the speed.
     """
 
     KIND = "the centrifugal force"

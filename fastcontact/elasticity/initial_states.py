@@ -38,7 +38,7 @@ class InitialState:
         Axes to which the components refer, in the forms of material axes.
     kinematics : str
     ramp : tuple
-        Points (instant, multiplier) of the ramp.
+        Points (load factor, multiplier) of the ramp.
     """
 
     kind: str

@@ -54,7 +54,7 @@ class DensityField(Protocol):
 class Load:
     """Base class of the loads of a model.
 
-    `ramp` contains the points (instant, multiplier) of the ramp; None means the ramp of the analysis.
+    `ramp` contains the points (load factor, multiplier) of the ramp; None means the ramp of the analysis.
     """
 
     KIND: ClassVar[str]

@@ -78,7 +78,7 @@ class MaterialField:
 
     @cached_property
     def averaged(self) -> Mask:
-        """Mask (n_moduli,) of moduli used with a mean dilatation; none in plane stress, where elements do not lock."""
+        """Mask (n_moduli,) of moduli used with a mean dilatation; none in plane stress, where cells do not lock."""
         averaged = np.array([material.averaged for material in self.materials], bool)
         return np.asarray(averaged[self.owner] & (self.kinematics != "plane_stress"))
 
@@ -97,10 +97,10 @@ class MaterialField:
 
     @cached_property
     def contrast(self) -> float:
-        """A measure of near incompressibility, at least 1 [-].
+        """Contrast of volumetric and shear stiffness, at least 1, which is large for nearly incompressible materials [-].
 
         It is the largest ratio of the extreme eigenvalues of the moduli for normal strains, minus one, divided by three. In
-        isotropic materials these eigenvalues are ``3 lambda + 2 mu`` and ``2 mu``, and the measure is ``nu / (1 - 2 nu)``.
+        isotropic materials these eigenvalues are ``3 lambda + 2 mu`` and ``2 mu``, and the contrast is ``nu / (1 - 2 nu)``.
         """
         n_normal = 2 if self.kinematics == "plane_stress" else 3
         is_used = self.moduli[:, 0, 0] > 0.0  # unused rows of varying materials are zero
@@ -145,7 +145,7 @@ class MaterialField:
         at_nodes = np.zeros(n_points) if rise is None else rise
         return StressOffset(at_nodes, np.nan_to_num(self.expansion), tuple(states))
 
-    def n_cells_without_expansion(self, mesh: Mesh, rise: Array) -> int:
+    def n_heated_cells_without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return the number of cells of materials without expansion whose `rise` (n_points,) [temperature] is not zero."""
         no_expansion = np.isnan(self.expansion[:, 0])
         heated = {name: (rise[block] != 0.0).any(axis=1) for name, block in mesh.solids.items()}

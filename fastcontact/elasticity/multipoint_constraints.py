@@ -30,7 +30,7 @@ class MultiPointConstraint:
     value : float or ndarray (m,)
         Right-hand sides at multiplier 1 of the ramp [length times the unit of the coefficients].
     ramp : tuple of (float, float), optional
-        Points (instant, multiplier) of the ramp of the right-hand side; None means the ramp of the analysis.
+        Points (load factor, multiplier) of the ramp of the right-hand side; None means the ramp of the analysis.
     """
 
     name: str

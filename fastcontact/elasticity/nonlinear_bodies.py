@@ -127,8 +127,9 @@ class NonlinearBodies:
     def _split(self, name: str) -> tuple[Array, Array, Array]:
         """Return the moduli for an element type, and bulk moduli (n_moduli, 2) and polynomials (n_q, m) for its dilatation.
 
-        The bulk moduli are those of the projected dilatation and of the remainder, as in `dilatation.Split`. If the
-        dilatation is projected, the moduli do not contain the bulk modulus.
+        The two columns of bulk moduli add up to the bulk modulus: the first multiplies the projected dilatation, and the
+        second the unprojected one, unlike in `dilatation.Split`. If the dilatation is projected, the moduli do not contain
+        them.
         """
         moduli, element = self._moduli.copy(), elements.get(name)
         bulk = np.zeros((len(moduli), 2))

@@ -27,7 +27,7 @@ class Temperature:
     reference : float
         Temperature at which there is no thermal strain [temperature].
     ramp : tuple, optional
-        Points (instant, multiplier) of the ramp of the temperature rise above the reference.
+        Points (load factor, multiplier) of the ramp of the temperature rise above the reference.
     times : tuple of float
         Instants of the history to which the temperature belongs; empty if there is no history.
     instant : int

@@ -14,8 +14,8 @@ from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear.sparse_rows import entry_rows, scaled
 
 # Largest relative difference between two sets of springs, or between the weights of eliminated unknowns, for which the same
-# preconditioner is used. With 3, "hex20" with friction takes 62 iterations instead of 48 (robustness table, 3 000 unknowns);
-# with 0.003, it takes 43, but the hierarchy changes with each pairing.
+# preconditioner is used. With 3, "hex20" with friction takes 62 iterations (48 with 0.3; `fastcontact bench
+# robustness`, 3 000 unknowns); with 0.003, it takes 43, but the hierarchy changes with each pairing.
 MAX_DIFFERENCE = 0.3
 
 

@@ -1,7 +1,7 @@
-"""Quadrature rules on reference lines, triangles, squares and solids, and determinants of Jacobians.
+"""Quadrature rules on reference lines, triangles, squares and solids, and determinants of Jacobian matrices.
 
-A `Rule` is a pair of points (n_q, dim) in reference coordinates and weights (n_q,), both dimensionless [-]. The weights add
-up to the measure of the reference cell.
+A `Rule` is a tuple ``(points, weights)`` of the points (n_q, dim) in reference coordinates [-] and their weights (n_q,) [-],
+which add up to the measure of the reference cell.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ def triangle(degree: int) -> Rule:
     return _orbit_rule(_TRIANGLE[degree])
 
 
-def triangle_3_sides() -> Rule:
-    """Return the three-point rule on the triangle, with midpoints of sides, exact to degree 2 (Strang and Fix, 1973)."""
+def triangle_3_midpoints() -> Rule:
+    """Return the three-point rule on the triangle, at the midpoints of sides, exact to degree 2 (Strang and Fix, 1973)."""
     return _orbit_rule([(1.0 / 3.0, 0.5)])
 
 
@@ -177,13 +177,13 @@ def _gauss_jacobi(n: int) -> tuple[Array, Array]:
     return (1.0 + roots) / 2.0, vectors[0] ** 2 / 3.0
 
 
-def product_rule(cell: str, n: int, cartesian: int | None = None) -> Rule:
-    """Return a product rule on the reference cell of the linear element `cell`, with `n` points in each direction.
+def product_rule(element: str, n: int, n_cartesian: int | None = None) -> Rule:
+    """Return a product rule on the reference cell of the linear element `element`, with `n` points in each direction.
 
-    If `cartesian` is given, it replaces `n` in the Cartesian directions of squares, cubes and prisms. Raises KeyError for an
-    unknown element.
+    If `n_cartesian` is given, it replaces `n` in the Cartesian directions of squares, cubes and prisms. Raises KeyError for
+    an unknown element.
     """
-    m = n if cartesian is None else cartesian
+    m = n if n_cartesian is None else n_cartesian
     return {
         "line2": lambda: gauss_line(n),
         "tri3": lambda: collapsed_triangle(n),
@@ -192,7 +192,7 @@ def product_rule(cell: str, n: int, cartesian: int | None = None) -> Rule:
         "hex8": lambda: gauss_cube(m),
         "wedge6": lambda: tensor_product(collapsed_triangle(n), gauss_line(m)),
         "pyramid5": lambda: conical_pyramid(n),
-    }[cell]()
+    }[element]()
 
 
 def subdivided(rule: Rule, count: int) -> Rule:
@@ -227,7 +227,7 @@ def collapsed_tetrahedron(n: int) -> Rule:
 
 
 def determinants(J: Array) -> Array:
-    """Return the determinants (...) [unit of J^dim] of the Jacobians `J` (..., dim, dim) [unit of J].
+    """Return the determinants (...) [unit of J^dim] of the Jacobian matrices `J` (..., dim, dim) [unit of J].
 
     They are computed by Laplace's expansion, which is three to five times as fast as `numpy.linalg.det`.
     """
@@ -239,7 +239,7 @@ def determinants(J: Array) -> Array:
     return np.asarray(J[..., 0, 0] * minor - J[..., 0, 1] * second + J[..., 0, 2] * third)
 
 
-def jacobians(x: Array, gradients: Array) -> Array:
+def jacobian_determinants(x: Array, gradients: Array) -> Array:
     """Return the Jacobian determinants (n_q, n_cells) [length^dim] of cells at n_q points.
 
     `x` (n_cells, n_nodes, dim) [length] are the positions of the nodes, and `gradients` (n_q, n_nodes, dim) [-] the

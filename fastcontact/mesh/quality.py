@@ -225,6 +225,6 @@ def extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
     """
     element, x = elements.get(name), mesh.points[mesh.cells[name]]
     _, gradients, weights = element.tables
-    determinants = quadrature.jacobians(x, gradients)
+    determinants = quadrature.jacobian_determinants(x, gradients)
     longest = np.max([np.linalg.norm(x[:, end] - x[:, begin], axis=1) for begin, end in element.edges], axis=0)
     return weights @ determinants, determinants.min(axis=0), determinants.max(axis=0), longest

@@ -39,7 +39,7 @@ def corner_measures(mesh: Mesh, name: str) -> Array:
     """
     linear = elements.get(elements.get(name).linear)
     _, gradients, weights = linear.tables
-    return weights @ quadrature.jacobians(mesh.points[mesh.cells[name][:, : linear.n_nodes]], gradients)
+    return weights @ quadrature.jacobian_determinants(mesh.points[mesh.cells[name][:, : linear.n_nodes]], gradients)
 
 
 @typed(MeshError)

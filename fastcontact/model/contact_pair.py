@@ -23,7 +23,7 @@ DrivingForce = tuple[float | None, ...]
 class FluidPressure:
     """Fluid that enters a contact from the group `source`.
 
-    `pressure` is the fluid pressure at multiplier 1 [pressure], and `ramp` is its history; None means the history of
+    `pressure` is the fluid pressure at load multiplier 1 [pressure], and `ramp` is its history; None means the history of
     the analysis.
     """
 
@@ -36,11 +36,11 @@ class FluidPressure:
 class ContactPair:
     """Two groups of facets that may touch, or a group and a rigid obstacle, with a formulation and its options.
 
-    If there is an `obstacle`, `primary` is empty. The displacement of the obstacle at multiplier 1 is `motion`
-    [length], and its history is `ramp`; None means the history of the analysis. Components in which `force` is not None
-    are driven by this force instead, which is given at multiplier 1 [force]. The obstacle rotates by `rotation` with
-    the history `rotation_ramp`, by default `ramp`. For automatically detected pairs, `detected_gap` is the smallest gap at
-    detection [length].
+    If there is an `obstacle`, `primary` is empty. The displacement of the obstacle at load multiplier 1 is `motion` [length],
+    and its history is `ramp`; None means the history of the analysis. Components in which `force` is not None are driven by
+    this force instead, which is given at load multiplier 1 [force]. The obstacle rotates by `rotation` with the history
+    `rotation_ramp`, by default `ramp`. For automatically detected pairs, `detected_gap` is the smallest gap at detection
+    [length].
     """
 
     name: str
@@ -125,7 +125,7 @@ def _vector(name: str, values: Sequence[float], size: int) -> tuple[float, ...]:
 
 
 def angle_at(pair: ContactPair, ramp: Ramp, instant: float) -> float:
-    """Return the rotation of the obstacle of a pair at an instant [radian]."""
+    """Return the rotation of the obstacle of a pair at the load factor `instant` [radian]."""
     if pair.rotation is None:
         return 0.0
     ramp_of_rotation = pair.ramp if pair.rotation_ramp is None else pair.rotation_ramp
@@ -146,7 +146,8 @@ def check_rotations(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
             change = abs(angle - previous)
             if change > LARGEST_ROTATION:
                 raise ModelError(
-                    f"obstacle '{pair.name}' turns by {change:.3g} rad in the step to {instant:g}, more than "
-                    f"{LARGEST_ROTATION:g}: with friction use at least {math.ceil(change / LARGEST_ROTATION)} steps instead"
+                    f"obstacle '{pair.name}' rotates by {change:.3g} rad in the step that ends at load factor {instant:g}, "
+                    f"more than {LARGEST_ROTATION:g} rad: with friction use at least "
+                    f"{math.ceil(change / LARGEST_ROTATION)} steps instead"
                 )
             previous = angle

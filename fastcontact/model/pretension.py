@@ -34,9 +34,9 @@ class Pretension:
     normal : ndarray (dim,)
         Unit vector from the first side to the opposite one, along the bolt [-].
     force : float
-        Force that pulls the sides together, at multiplier 1 [force].
+        Force that pulls the sides together, at load multiplier 1 [force].
     shortening : float or None
-        Relative approach of the sides, at multiplier 1 [length]; None if the force is given.
+        Relative approach of the sides, at load multiplier 1 [length]; None if the force is given.
     locked_from : float or None
         Load factor from which the shortening is locked [-].
     ramp : tuple, optional
@@ -98,12 +98,12 @@ class PretensionForce(Load):
     """The force that pulls the sides of a pretension section together."""
 
     KIND = "the force"
-    section: Pretension
+    pretension: Pretension
 
     @property
     def name(self) -> str:
         """Description for messages."""
-        return f"the force of {self.section.name}"
+        return f"the force of {self.pretension.name}"
 
     @property
     def group_names(self) -> tuple[str, ...]:
@@ -113,26 +113,26 @@ class PretensionForce(Load):
     @property
     def components(self) -> Mapping[int, float]:  # type: ignore[override]
         """Components of the force on the first side [force]."""
-        return {axis: self.section.force * float(n) for axis, n in enumerate(self.section.normal) if n}
+        return {axis: self.pretension.force * float(n) for axis, n in enumerate(self.pretension.normal) if n}
 
     @property
     def ramp(self) -> Table | None:  # type: ignore[override]
         """Ramp of the force."""
-        return self.section.ramp
+        return self.pretension.ramp
 
     def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         pass
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        section = self.section
-        nodal_force = section.force / len(section.nodes) * section.normal
-        forces[section.nodes] += nodal_force
-        forces[section.opposite] -= nodal_force
+        pretension = self.pretension
+        nodal_force = pretension.force / len(pretension.nodes) * pretension.normal
+        forces[pretension.nodes] += nodal_force
+        forces[pretension.opposite] -= nodal_force
 
 
 def pretension(
     mesh: Mesh, label: str, section: str, opposite: str | None, normal: Sequence[float] | None,
-    amounts: tuple[float | None, float | None, float | None], ramp: Table | None,
+    prescribed: tuple[float | None, float | None, float | None], ramp: Table | None,
 ) -> Pretension:  # fmt: skip
     """Return a pretension section after checking it.
 
@@ -141,7 +141,7 @@ def pretension(
     mesh : Mesh
     label, section, opposite, normal
         See `Model.add_pretension`.
-    amounts : (float or None, float or None, float or None)
+    prescribed : (float or None, float or None, float or None)
         Force [force], shortening [length], and load factor from which the shortening is locked [-].
     ramp : tuple, optional
         Ramp of the force or shortening.
@@ -149,9 +149,9 @@ def pretension(
     Raises
     ------
     MeshError, ModelError
-        If the sides do not match, or the amounts are inconsistent.
+        If the sides do not match, or the prescribed quantities are inconsistent.
     """
-    force, shortening, locked_from = amounts
+    force, shortening, locked_from = prescribed
     name = f"pretension '{label}'"
     if (force is None) == (shortening is None):
         raise ModelError(f"{name} needs either a force or a shortening")
@@ -248,8 +248,8 @@ def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> No
         if instants[0] < locked_from < instants[-1] and locked_from not in instants:
             nearest = min(instants, key=lambda instant: abs(instant - locked_from))
             raise ModelError(
-                f"{bolt.name} is locked from {locked_from:g}, but no load step ends there: add this instant to the ramp, or "
-                f"lock it at the end of a step, such as {nearest:g}"
+                f"{bolt.name} is locked from {locked_from:g}, but no load step ends there: add this load factor to the ramp, "
+                f"or lock it at the end of a step, such as {nearest:g}"
             )
 
 

@@ -1,4 +1,9 @@
-"""The load ramp: the load factors at which the model is solved, and the multiplier of the loads at each load factor."""
+"""The load ramp: multiplier of the loads as a function of the load factor, which is the pseudo-time of the analysis.
+
+A `Ramp` consists of the load factors at the ends of the load steps, called instants, and of a piecewise linear function. The
+points of such a function are a `Table`. An item of a model, such as a load, may have a function of its own, called its
+history.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +35,7 @@ class Harmonic:
     ramp : Table, optional
         History of the angle; None means the history of the analysis.
     angle : float
-        Angle at multiplier 1 [radian].
+        Angle at load multiplier 1 [radian].
     versine : bool
         Whether the history is one minus the cosine instead of the sine.
     """
@@ -52,18 +57,18 @@ MAX_STEPS = 1_000_000
 
 
 def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") -> Table:
-    """Return the points (instant, multiplier) of a piecewise linear function, called `caption` in messages.
+    """Return the points (load factor, multiplier) of a piecewise linear function, called `caption` in messages.
 
-    Raises ModelError if there are fewer than two points, their instants do not ascend, or a number is not finite or
-    exceeds LARGEST in magnitude.
+    Raises ModelError if there are fewer than two points, their load factors are not strictly increasing, or a number is not
+    finite or exceeds LARGEST in magnitude.
     """
     try:
-        table = tuple((float(time), float(value)) for time, value in rows)
+        table = tuple((float(factor), float(value)) for factor, value in rows)
     except (OverflowError, TypeError, ValueError):
-        raise ModelError(f"the table of {caption} must contain pairs (instant, multiplier of the loads)") from None
-    times = np.asarray([time for time, _ in table])
-    if len(table) < 2 or not (np.diff(times) > 0).all():
-        raise ModelError(f"the table of {caption} needs at least two points with ascending instants")
+        raise ModelError(f"the table of {caption} must contain pairs (load factor, multiplier of the loads)") from None
+    load_factors = np.asarray([factor for factor, _ in table])
+    if len(table) < 2 or not (np.diff(load_factors) > 0).all():
+        raise ModelError(f"the table of {caption} needs at least two points with strictly increasing load factors")
     if not np.isfinite(table).all():
         raise ModelError(f"the table of {caption} contains a number that is not finite: {table}")
     if np.abs(table).max() > LARGEST:
@@ -83,15 +88,15 @@ def interpolation_tables(instants: Sequence[float], caption: str) -> list[Table]
 
     All functions are zero at the load factor 0, unless the first instant is 0. Raises the errors of `checked_table`.
     """
-    times = instants if 0.0 in instants[:1] else [0.0, *instants]
-    checked_table([(time, 0.0) for time in times], caption)
-    return [tuple((time, float(time == instant)) for time in times) for instant in instants]
+    load_factors = instants if 0.0 in instants[:1] else [0.0, *instants]
+    checked_table([(factor, 0.0) for factor in load_factors], caption)
+    return [tuple((factor, float(factor == instant)) for factor in load_factors) for instant in instants]
 
 
 def table_value(table: Table, instant: float) -> float:
-    """Return the value of the piecewise linear function `table` at `instant`; the function is constant beyond its ends."""
-    times, values = zip(*table, strict=True)
-    return float(np.interp(instant, times, values))
+    """Return the value of the piecewise linear function `table` at the load factor `instant`, constant beyond its ends."""
+    load_factors, values = zip(*table, strict=True)
+    return float(np.interp(instant, load_factors, values))
 
 
 @typed(ModelError)
@@ -104,14 +109,14 @@ class Ramp:
     Parameters
     ----------
     instants : sequence of float or ndarray (n_steps,)
-        Ascending load factors at the ends of the load steps [-].
+        Load factors at the ends of the load steps, strictly increasing [-].
     table : sequence of (float, float)
-        Points (load factor, multiplier of the loads) of the function, with ascending load factors [-].
+        Points (load factor, multiplier of the loads) of the function, with strictly increasing load factors [-].
 
     Raises
     ------
     ModelError
-        If the instants or the load factors of the table do not ascend, or an instant lies outside the table.
+        If the instants or the load factors of the table are not strictly increasing, or an instant lies outside the table.
 
     Examples
     --------
@@ -130,14 +135,14 @@ class Ramp:
     def __post_init__(self) -> None:
         instants = np.asarray(tuple(self.instants), float)
         table = checked_table(self.table)
-        times = np.asarray([time for time, _ in table])
+        load_factors = np.asarray([factor for factor, _ in table])
         if instants.ndim != 1 or not len(instants):
             raise ModelError("the ramp has no instants: give at least one load factor to solve at")
         if not (np.isfinite(instants).all() and (np.diff(instants) > 0).all()):
-            raise ModelError(f"the instants of the ramp must ascend, not {self.instants}")
-        outside = instants[(instants < times[0]) | (instants > times[-1])]
+            raise ModelError(f"the instants of the ramp must be strictly increasing, not {self.instants}")
+        outside = instants[(instants < load_factors[0]) | (instants > load_factors[-1])]
         if len(outside):
-            range_text = f"{times[0]:g} to {times[-1]:g}"
+            range_text = f"{load_factors[0]:g} to {load_factors[-1]:g}"
             raise ModelError(f"instant {outside[0]:g} lies outside the table of the ramp, which covers {range_text}")
         object.__setattr__(self, "instants", tuple(float(t) for t in instants))
         object.__setattr__(self, "table", table)
@@ -213,7 +218,7 @@ def ramp_of(steps: RampLike | None) -> Ramp:
         table = checked_table(values)
         return Ramp(tuple(instant for instant, _ in table[1:]), table)
     if values.ndim != 1:
-        forms = "a number of steps, load factors (n,), pairs (instant, multiplier) (n, 2), or a Ramp"
+        forms = "a number of steps, load factors (n,), pairs (load factor, multiplier) (n, 2), or a Ramp"
         raise ModelError(f"the ramp must be {forms}")
     end = max(1.0, values.max(initial=1.0))
     return Ramp(tuple(values), ((0.0, 0.0), (end, end)))

@@ -7,12 +7,13 @@ Format Specification 3.0, sections II.A and III.A):
 
 1. new blocks, to which no other block refers yet;
 2. the superblock with the end of the file;
-3. nodes of indices from the root down, so that entries are in their new node before they are removed from the old one;
+3. nodes of B-trees (``TREE``) from the root down, so that entries are in their new node before they are removed from the old
+one;
 4. all other writes;
-5. name tables;
+5. symbol table nodes (``SNOD``), which contain the names of entries;
 6. the object header with the number of steps, which completes a step.
 
-HDF5 writes entire nodes of indices and parts of tables, although a step changes only a few of their bytes. The class writes
+HDF5 writes entire B-tree nodes and symbol table nodes, although a step changes only a few of their bytes. The class writes
 only the range from the first to the last changed byte.
 
 The order protects the file if the process is killed, but not in the event of a power loss, since disks reorder writes.
@@ -35,7 +36,7 @@ import numpy as np
 from fastcontact._tools.hdf5 import DriverFile
 from fastcontact.results import journal
 
-# Signatures of the superblock, of nodes of indices and of name tables in HDF5.
+# Signatures of the superblock, of B-tree nodes and of symbol table nodes in HDF5.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
 N_STEPS = b"NSteps\0"  # name of the attribute with the number of steps
 # Longest write that is compared with the file [bytes]. In longer writes, which contain data, all bytes change.
@@ -46,8 +47,8 @@ SIGNALS = tuple(map(int, signal.valid_signals()))
 class CommittedFile(DriverFile):
     """An existing HDF5 file whose writes are deferred to `flush`, with the methods that `h5py.File` calls.
 
-    Nothing is written after an error, so that the file remains as it was after the last successful write, or after
-    another program has written to the file.
+    Nothing is written after an error, or after another program has written to the file. After an error, the file therefore
+    remains as it was after the last successful write.
 
     Attributes
     ----------
@@ -86,7 +87,7 @@ class CommittedFile(DriverFile):
         return self._file.read(48)
 
     def is_intact(self) -> bool:
-        """Return whether no other program has changed the superblock, which each flush changes, or truncated the file."""
+        """Return whether no other program has truncated the file, or changed the superblock as each flush does."""
         is_truncated = os.fstat(self.fileno()).st_size < self._ends[-1]
         self.exclusive = self.exclusive and not is_truncated and self._read_head() == self._head
         return self.exclusive

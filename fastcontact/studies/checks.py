@@ -17,16 +17,16 @@ from fastcontact.studies.settings import Combination, Settings, make_mesh, recip
 
 log = logging.getLogger("fastcontact")
 # Largest number of runs of a study; larger numbers are probably mistakes.
-MOST_RUNS = 100_000
+MAX_RUNS = 100_000
 # Peak memory per unknown [byte] of a multigrid analysis, measured with `fastcontact bench contact` for linear hexahedra,
 # which need the least memory.
 BYTES_PER_UNKNOWN = 2500
 
 
 def check_runs(count: int) -> None:
-    """Raise CaseError if a study has more than `MOST_RUNS` runs."""
-    if count > MOST_RUNS:
-        raise CaseError(f"a study of {count} runs is too large: at most {MOST_RUNS} are possible")
+    """Raise CaseError if a study has more than `MAX_RUNS` runs."""
+    if count > MAX_RUNS:
+        raise CaseError(f"a study of {count} runs is too large: at most {MAX_RUNS} are possible")
     log.info("%d runs", count)
 
 
@@ -41,7 +41,7 @@ def check_levels(case: Case, setup: Settings, selected: Sequence[Combination], l
             raise CaseError(
                 f"level {levels - 1} of {combination} would have about {unknowns[-1]:.2g} unknowns and take "
                 f"{BYTES_PER_UNKNOWN * unknowns[-1] / 1e9:.2g} GB of memory, of which this machine has {memory / 1e9:.2g}: "
-                f"give at most {max(n_fitting, 1)} levels"
+                f"reduce the number of levels to {max(n_fitting, 1)}"
             )
         log.info("%s: up to about %d unknowns on level %d", combination, unknowns[-1], levels - 1)
 
@@ -57,8 +57,8 @@ def _memory() -> float:
 def check_study(case: Case) -> None:
     """Raise FastcontactError if a study of a case could not start.
 
-    If ``[study]`` contains the arguments of quadrangle meshes on level 0, these meshes are generated for the check. Free
-    triangle meshes are not generated, because this takes as long as a short run.
+    If ``[study]`` contains the arguments of quadrangle meshes on level 0, these meshes are generated for the check.
+    Unstructured triangle meshes are not generated, because this takes as long as a short run.
     """
     setup = settings(case)
     study = setup.data.get("study", {})

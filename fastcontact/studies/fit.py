@@ -31,7 +31,7 @@ AGREEMENT = 1e-4
 # Orders over which the results are averaged.
 ORDERS = np.geomspace(0.4, 6.0, 81)
 # Median of the prior of the order, and standard deviation of its logarithm.
-PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35
+PRIOR_ORDER, PRIOR_DEVIATION = 1.6, 0.35
 # Relative scatter in the prior, and its weight in meshes.
 PRIOR_NOISE, PRIOR_WEIGHT = 0.2, 1.5
 # Ratio of the scatter of meshes that are too coarse to that of other meshes, and factor of the prior probability for each
@@ -49,7 +49,7 @@ class Limit:
         Estimated limit, in the unit of the quantity.
     uncertainty : float
         Half-width of the interval ``value - uncertainty`` to ``value + uncertainty``, which contains the limit with a
-        probability of 95 %, in the unit of the quantity.
+        probability of at least 95 %, in the unit of the quantity.
     order, order_uncertainty : float
         Fitted order of convergence with respect to the mesh size, and its standard deviation [-]; NaN if the values do not
         change.
@@ -69,7 +69,7 @@ class Limit:
     converging: bool
 
     def contains(self, value: float) -> bool:
-        """Return whether `value` lies within the 95 % interval of the limit."""
+        """Return whether `value` lies between ``self.value - uncertainty`` and ``self.value + uncertainty``."""
         return abs(value - self.value) <= self.uncertainty
 
 
@@ -115,11 +115,11 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     orders = np.tile(ORDERS, len(value) - 2)
     order = float(weight @ orders)
     decreasing = changes[-1] < max(0.9 * float(np.median(changes[:-1])), 0.05 * scale)
-    spread = float(np.ptp(value))
-    agreeing = not decreasing and spread <= AGREEMENT * np.abs(value).max()
+    value_range = float(np.ptp(value))
+    agreeing = not decreasing and value_range <= AGREEMENT * np.abs(value).max()
     return Limit(
         value=float(value[-1] + scale * middle),
-        uncertainty=max(float(scale * max(high - middle, middle - low)), spread if agreeing else 0.0),
+        uncertainty=max(float(scale * max(high - middle, middle - low)), value_range if agreeing else 0.0),
         order=order,
         order_uncertainty=float(np.sqrt(weight @ (orders - order) ** 2)),
         n_levels=len(value),
@@ -156,16 +156,17 @@ def _limit_distributions(x: Array, y: Array, floor: float, coarse: int) -> Array
     result = np.empty((3, len(ORDERS)))
     dof = len(x) - 2 + PRIOR_WEIGHT
     noise = np.where(np.arange(len(x)) < coarse, COARSE_NOISE, 1.0)
-    prior = coarse * np.log(COARSE_PROBABILITY / COARSE_NOISE)
+    # The density of each value that is assumed too coarse has the factor 1 / COARSE_NOISE.
+    log_prior = coarse * np.log(COARSE_PROBABILITY / COARSE_NOISE)
     for i, p in enumerate(ORDERS):
-        spread = noise * x**p
-        A = np.column_stack([1.0 / spread, 1.0 / noise])
+        deviation = noise * x**p
+        A = np.column_stack([1.0 / deviation, 1.0 / noise])
         inverse = np.linalg.inv(A.T @ A)
-        solution = inverse @ (A.T @ (y / spread))
-        residual = y / spread - A @ solution
+        solution = inverse @ (A.T @ (y / deviation))
+        residual = y / deviation - A @ solution
         squares = residual @ residual + PRIOR_WEIGHT * (PRIOR_NOISE * solution[1]) ** 2 + floor
         evidence = 0.5 * np.log(np.linalg.det(inverse)) - 0.5 * dof * np.log(squares)
-        evidence += prior - 0.5 * (np.log(p / PRIOR_ORDER) / PRIOR_SPREAD) ** 2
+        evidence += log_prior - 0.5 * (np.log(p / PRIOR_ORDER) / PRIOR_DEVIATION) ** 2
         result[:, i] = solution[0], np.sqrt(squares / dof * inverse[0, 0]), evidence
     return result
 

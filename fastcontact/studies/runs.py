@@ -90,7 +90,7 @@ def convergence_study(
         calling process.
     workers : int, optional
         Number of processes; by default one for each processor, and 1 for a function. With 1 all runs are executed in the
-        calling process. Several processes import the calling script, which must therefore call this function under
+        calling process. Each of several processes imports the calling script, which must therefore call this function under
         ``if __name__ == "__main__":``.
     store : path-like, optional
         Folder with the results of finished runs of a case. Stored results are reused, and new ones are added.
@@ -220,9 +220,9 @@ def _series(
 ) -> Series:  # fmt: skip
     """Return the series of one element type and formulation with its limits.
 
-    The quantities in `requested` must be in the results; those in `checked` are fitted if they are. `theory` consists of the
-    theory of the contact pair, the fraction of the contact that the model represents, and the condition of the comparison
-    (see `Series.compared`).
+    The quantities in `requested` must be in the results; those in `checked` are fitted if they are. The attribute
+    `Series.asked` is `asked`. `theory` consists of the theory of the contact pair, the fraction of the contact that the model
+    represents, and the condition under which both are compared (see `Series.compared`).
     """
     solved = [(number, result) for number, result in results if "error" not in result]
     levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]

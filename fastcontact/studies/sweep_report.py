@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas
 
 # Smallest ratio of the largest to the smallest value of a parameter for which its axis is logarithmic.
-WIDE = 9.0
+MIN_LOGARITHMIC_RATIO = 9.0
 # Title and kind of unit (empty for ratios) of parameters, by the last word of their paths.
 MEANINGS = {
     "E": ("Young's modulus", "pressure"),
@@ -74,28 +74,31 @@ def abscissa_of(parameters: Mapping[str, Sequence[Value]]) -> tuple[str, list[st
 
 
 class Drawing:
-    """Plots of a sweep over one parameter, the `abscissa`, with a curve for each choice of the `curve_parameters`.
+    """Plots of a sweep over one parameter, the `abscissa`, with a curve for each combination of `curve_parameters`.
 
     `abscissa_of` defines both. `scale` is that of the x axis, as in `format_axes`.
     """
 
     def __init__(self, sweep: Sweep) -> None:
         self.abscissa, self.curve_parameters = abscissa_of(sweep.parameters)
-        self.sweep, self.theory = sweep, f"theory {sweep.compared}".strip()
+        self.sweep, self.theory_label = sweep, f"theory {sweep.compared}".strip()
         values = sweep.parameters[self.abscissa]
         numbers = [float(v) for v in values if not isinstance(v, (str, bool))]
-        wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= WIDE * min(numbers)
+        wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= MIN_LOGARITHMIC_RATIO * min(numbers)
         self.scale = "plain log" if wide else "linear"
         self.points_of: dict[str, list[Point]] = {}  # points of each curve, by its label
         for point in sweep.points:
             self.points_of.setdefault(label_of(point.parameters, self.curve_parameters), []).append(point)
 
     def draw_values(self, ax: Any, quantity: str) -> None:
-        """Draw a quantity and its theory over the parameter; both axes are logarithmic if all values are positive."""
+        """Draw a quantity and its theory against the parameter.
+
+        If all values of the quantity are positive, the y axis has the scale of the x axis; otherwise it is linear.
+        """
         for k, (label, points) in enumerate(self.points_of.items()):
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(self._x(points), y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
-            name = (self.theory + self._constant_note(quantity)) if k == 0 else None
+            name = (self.theory_label + self._constant_note(quantity)) if k == 0 else None
             style = {"label": name, "color": f"C{k}" if self.curve_parameters else "black"}
             curves = (curve for curve in self.sweep.theories if curve.label == label and quantity in curve.values)
             exact = [point.theory.get(quantity, math.nan) for point in points]
@@ -120,8 +123,8 @@ class Drawing:
         return f"\n(the same for every {self.abscissa})" if constant else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
-        """Draw the ratios of a quantity to theory, at equal approach and at equal force, over the parameter."""
-        styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
+        """Draw the ratios of a quantity to theory, at equal approach and at equal force, against the parameter."""
+        styles = {"theory": ("-", self.theory_label), "equal_force": ("--", "theory at equal force")}
         n_lines = 0
         for k, (label, points) in enumerate(self.points_of.items()):
             for comparison, (style, name) in styles.items():
@@ -132,7 +135,7 @@ class Drawing:
                     ax.plot(self._x(points), ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
                     n_lines += 1
         if not n_lines:
-            return show_message(ax, f"no theory of the {title(quantity)}")
+            return show_message(ax, f"no theoretical value of the {title(quantity)}")
         ax.axhline(1.0, color="black", lw=0.8)
         self._format(ax, f"{title(quantity)}: ratio to theory{self._constant_note(quantity)}", "computed / theory [-]")
 
@@ -152,7 +155,8 @@ def label_of(parameters: Mapping[str, Value], names: Sequence[str] | None = None
 
 # Standard quantities in tables and figures.
 STANDARD = ("force", "pressure_max", "contact_radius")
-# Names of the relative differences in JSON and CSV files, by the attribute of a point with the values for comparison.
+# Names of the relative differences in JSON and CSV files, by the attribute of `Point` with which results are
+# compared.
 DIFFERENCES = {"theory": "from_theory", "equal_force": "from_theory_at_equal_force", "reference": "from_reference"}
 
 
@@ -171,15 +175,17 @@ class Sweep(Report):
     failed : list of (dict, str)
         Parameters of each point that could not be solved, and the reason.
     theories : tuple of TheoryCurve
-        Theory over the first parameter with several numbers, for each choice of the other parameters; empty without one.
+        Theoretical values against the first parameter with several numbers, one curve for each combination of the others;
+        empty without a theory.
     compared : str
-        Condition of the comparison with theory: ``"at equal approach"``, or empty if the case prescribes another load.
+        Condition under which results are compared with theory: ``"at equal approach"``, or empty if the case prescribes
+        another load.
     asked : tuple of str
         Additional quantities of ``[study]`` in tables and figures.
     """
 
     kind = "Sweep"
-    picture = "quantities over the parameter, and their ratio to theory"
+    picture = "quantities against the parameter, and their ratio to theory"
 
     combination: str
     parameters: dict[str, tuple[Value, ...]]
@@ -246,18 +252,21 @@ class Sweep(Report):
         remarks += [f"{label_of(choice)} failed: {text}" for choice, text in self.failed]
         theories = [{point.theory.get(name) for point in self.points} - {None} for name in self._main_quantities()]
         values = [[point.values.get(name, math.nan) for point in self.points] for name in self._main_quantities()]
-        differ = [np.ptp(computed) > NOTABLE * np.max(np.abs(computed)) for computed in values]  # not prescribed forces
+        differ = [
+            np.ptp(computed) > NOTABLE * np.max(np.abs(computed)) for computed in values
+        ]  # False for prescribed forces
         if any(len(theory) == 1 and varies for theory, varies in zip(theories, differ, strict=True)):
             remarks += [
-                "the theory is the same for all points: a parameter in [study.parameters] can change keys of the theory, too"
+                "the theory is the same for all points: a name in [study.parameters] can also set keys of "
+                "the theory, such as theory.PAIR.E1"
             ]
         return remarks
 
     def figure(self) -> Any:
-        """Return a Matplotlib figure with the values over a parameter and their ratios to theory.
+        """Return a Matplotlib figure with the values against a parameter and their ratios to theory.
 
-        The parameter is the first with several numbers. There is a curve for each choice of the others; the title states
-        those with a single value.
+        The parameter is the first with several numbers. There is a curve for each combination of values of the others; the
+        title states parameters with a single value.
         """
         names, drawing = self._main_quantities(), Drawing(self)
         with_theory = any(name in point.theory for point in self.points for name in names)
@@ -265,7 +274,7 @@ class Sweep(Report):
         size = ((8.8 if with_theory else 5.2) + legend_width, 0.5 + 3.1 * len(names))
         varied = (drawing.abscissa, *drawing.curve_parameters)
         fixed = {name: values[0] for name, values in self.parameters.items() if name not in varied}
-        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # for a function both may be its name
+        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # equal for some studies of functions
         heading += f"\n{label_of(fixed)}" if fixed else ""
         axes = panels((len(names), 1 + with_theory), size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):
@@ -287,12 +296,12 @@ class Sweep(Report):
             columns.append((name, [number(v) if isinstance(v, float) else str(v) for v in choices]))
         columns.append(("DOF", [str(point.n_dofs) for point in self.points]))
         for name in self._main_quantities():
-            compared = {}
+            differences = {}
             if any(name in point.theory for point in self.points):
-                compared = {"theory": "from theory"} | ({"equal_force": "at equal force"} if name != "force" else {})
+                differences = {"theory": "from theory"} | ({"equal_force": "at equal force"} if name != "force" else {})
             values = [number(point.values.get(name, math.nan), 7) for point in self.points]
             columns.append((column(name, name, self.units), values))
-            for comparison, label in compared.items():
+            for comparison, label in differences.items():
                 columns.append((label, [percent(point.ratio(name, comparison) - 1.0) for point in self.points]))
         return [(self.combination if self.combination != self.title else "", to_rows(columns))]
 

@@ -481,7 +481,7 @@ RAMP = [
     Mistake("a ramp that ends at zero", lambda: fc.linear_ramp(2, end=0.0), fc.ModelError,
             r"the ramp must end at a positive load factor, not 0\.0"),
     Mistake("instants that do not ascend", lambda: fc.Ramp((0.5, 0.2)), fc.ModelError,
-            r"the instants of the ramp must ascend, not \(0\.5, 0\.2\)"),
+            r"the instants of the ramp must be strictly increasing, not \(0\.5, 0\.2\)"),
     Mistake("a ramp without instants", lambda: fc.Ramp(()), fc.ModelError,
             r"the ramp has no instants: give at least one load factor to solve at"),
     Mistake("an instant beyond the table", lambda: fc.Ramp((0.5, 2.0)), fc.ModelError,

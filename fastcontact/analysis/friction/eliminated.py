@@ -28,14 +28,14 @@ from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF, TINY
 
 # Bound of the stiffness of the spring perpendicular to the slip, relative to the stiffness of the constraint. Without a
 # bound it tends to infinity as the slip vanishes. The solution does not depend on it, because its slip is parallel to d.
-# With a bound of 1, the base case takes 129 iterations instead of 22, and with 1e6 "hex20" 63 instead of 48 (robustness
-# table, 3 000 unknowns, friction).
+# With a bound of 1, the base case with friction takes 129 iterations (22 with 100), and with 1e6 "hex20" takes 63 (48 with
+# 100; `fastcontact bench robustness`, 3 000 unknowns).
 STIFFEST = 100.0
 # Estimated stiffness of a constraint relative to the stiffness that the diagonal of K gives it. It is smaller because
 # neighbouring nodes deform as well. Nearly incompressible cells resist the displacement of a single node far more than that
 # of a surface (`LinearSolver.contrast`). If this contrast exceeds MILD_CONTRAST, the estimate is divided by the square root
 # of their ratio; otherwise Newton's method reverses a few slips repeatedly (with nu = 0.4999 and 161 442 unknowns, 588
-# iterations did not converge; nu = 0.499 was not affected). With 1, "hex20" in the same table takes 64 iterations.
+# iterations did not converge; nu = 0.499 was not affected). With 1, "hex20" in the same benchmark takes 64 iterations.
 STIFFNESS_ESTIMATE = 0.2
 # Tolerance of the residual of the friction law relative to the tolerance of the linear solutions, and the larger tolerance
 # that is accepted where it cannot be reached. If contact forces are a small fraction of all forces, they cannot be more

@@ -246,7 +246,7 @@ def _pretension_derivatives(contact: MovingContact, parameter: Label) -> Change:
     if section.shortening is not None:
         relation_numbers = [i for i, relation in enumerate(model.relations) if relation.name == section.constraint_name]
         return _prescribed_value_derivatives(contact, np.zeros(contact.problem.shape), relation_numbers)
-    forces = [load for load in model.loads if isinstance(load, PretensionForce) and load.section is section]
+    forces = [load for load in model.loads if isinstance(load, PretensionForce) and load.pretension is section]
     return replace(_zero_change(contact), residual=-_forces(contact, forces))
 
 

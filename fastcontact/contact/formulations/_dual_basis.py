@@ -30,7 +30,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 # Smallest covered fraction, that is, the fraction of the weight of a function that faces the other side. A node with a
 # smaller fraction has no gap, because its weighted gap would be extrapolated from a small part. On facets with
 # ill-conditioned dual functions, a function with a smaller fraction has no dual function. With 0.0002, random model 11 takes
-# 6 pairings instead of 3.
+# 6 pairings (3 with 0.02).
 SMALL_FRACTION = 0.02
 # Covered fractions above this multiple of the largest one count as equal to it, because on curved facets the fractions of
 # fully covered functions differ by a few percent.

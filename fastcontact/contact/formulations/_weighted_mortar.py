@@ -53,13 +53,16 @@ MULTIPLIERS = ("standard", "dual")
 
 
 class Coverage(NamedTuple):
-    """The overlap of both sides, and the integrals of the test functions over it.
+    """The overlap of both sides, and the integrals of the test functions and of the functions psi over it.
+
+    The k test functions of a facet depend on its element type only. With standard multipliers, psi are the test functions of
+    the nodes that have a gap; with dual multipliers, they are biorthogonal to these on the overlap.
 
     Attributes
     ----------
     overlap : Overlap
     weights : list of ndarray (n_facets, k)
-        Integrals over the overlap of the k test functions of the facets of each block [area].
+        Integrals of the test functions over the overlap, for the facets of each block [area].
     with_gap : ndarray of bool (m,)
         Secondary nodes that have a gap.
     functions : list of (ndarray (n_facets, k, k), ndarray (n_facets, k, k))
@@ -110,14 +113,15 @@ class SlipData(NamedTuple):
     ----------
     tangents : ndarray (k, m, dim)
         Unit tangents [-].
-    length : ndarray (m,)
+    closing_length : ndarray (m,)
         Lengths by which gaps close in the step [length].
     substitutions : list of (Substitution, Coverage)
-        Additional slips in directions in which supports hold both sides, each with the coverage without the held nodes.
+        Corrections of slips along directions in which supports hold both sides, each with the coverage in which the held
+        nodes have no gap.
     """
 
     tangents: Array
-    length: Array
+    closing_length: Array
     substitutions: list[tuple[Substitution, Coverage]]
 
 
@@ -128,10 +132,11 @@ class WeightedMortar(Formulation):
     Parameters
     ----------
     normals : str or sequence of float
-        Normals whose mean is the normal of a node: ``"facet"`` for those of the opposite primary facets, or ``"averaged"``
-        for interpolated nodal averages. ``"secondary"`` and vectors are those of `Formulation`.
+        Normals of the primary side whose weighted mean is the normal of a node: ``"facet"`` for those of the opposite facets,
+        or ``"averaged"`` for averages at the primary nodes, interpolated on the facets. ``"secondary"`` and vectors have the
+        same meaning as in `Formulation`.
     multipliers : str
-        ``"dual"``, or in 3D ``"standard"``.
+        ``"dual"`` or, in 3D only, ``"standard"``; in 2D the latter is the method of another class, see `mortar`.
     """
 
     projection_tolerance: float = SINGLE_PRECISION
@@ -189,16 +194,16 @@ class WeightedMortar(Formulation):
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         means = self._means(config)
         # Tied pairs have separate equations for the directions in which both sides are held.
-        held = directions_without_slip(self, config) if self.has_tangents and self.options.kind != "tied" else []
-        constraints, slip_data = self._weighted_gaps(config, means, held)
-        return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
+        no_slip = directions_without_slip(self, config) if self.has_tangents and self.options.kind != "tied" else []
+        constraints, slip_data = self._weighted_gaps(config, means, no_slip)
+        return replace(constraints, geometry=partial(self._linearised, config, means, no_slip, constraints, slip_data))
 
     def _weighted_gaps(
-        self, config: Configuration, means: Means, held: list[tuple[Array, Mask]]
+        self, config: Configuration, means: Means, no_slip: list[tuple[Array, Mask]]
     ) -> tuple[Constraints, SlipData | None]:
         """Return the constraints without their derivatives, and the data of their slips.
 
-        `held` are the `directions_without_slip`. The data are None without tangents.
+        `no_slip` are the `directions_without_slip`. The data are None without tangents.
         """
         coverage, D, M, weight, motion, gap_reduction, normal = means
         B = rows_of(motion, normal)
@@ -216,14 +221,15 @@ class WeightedMortar(Formulation):
         if not self.has_tangents:
             return constraints, None
         projectors = np.zeros((*normal.shape, normal.shape[1]))
-        for axis, nodes_held in held:
+        for axis, nodes_held in no_slip:
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
         axes = tangents(normal, projectors)
         mu, directions, slip_axes = self.options.friction_axes(self.friction, axes, self.node_candidates)
-        slips, substitutions = self._slips(slip_axes, held, means)
+        slips, substitutions = self._slips(slip_axes, no_slip, means)
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
-        # Part of the relative motion that is not slip: that of a rigid obstacle, or minus the motion that closes the gap.
+        # Motion that does not count as slip, with the sign of the secondary side relative to the primary one at rest: that of
+        # the obstacle itself, or that which closes the gap, opposite to `closing_direction`.
         if isinstance(self.primary, RigidSide):
             non_slip = self.rigid_motion(motion.__matmul__, config)
         else:
@@ -256,7 +262,7 @@ class WeightedMortar(Formulation):
         return Means(coverage, D, M, weight, motion, gap_reduction / weight[:, None], normal)
 
     def _linearised(
-        self, config: Configuration, means: Means, held: list[tuple[Array, Mask]], constraints: Constraints,
+        self, config: Configuration, means: Means, no_slip: list[tuple[Array, Mask]], constraints: Constraints,
         slip_data: SlipData | None, multiplier: Array, tangential: Array, displacement: Array,
     ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
@@ -267,7 +273,7 @@ class WeightedMortar(Formulation):
 
             def constraints_after(motion: Array) -> Constraints:
                 moved = replace(config, displacement=config.displacement + motion)
-                return self._weighted_gaps(moved, self._means(moved, means.coverage), held)[0]
+                return self._weighted_gaps(moved, self._means(moved, means.coverage), no_slip)[0]
 
             sides = np.concatenate([self.secondary.points, self.primary.points])
             motions = displacement, displacement - config.start, displacement - config.displacement
@@ -285,7 +291,7 @@ class WeightedMortar(Formulation):
             opening = means.motion @ slips.start - means.gap_reduction
             side = config.deformed(self.secondary, self.points)
             secondary = None if is_rigid else (side.nodal_normals, side.variation)
-            closing = ClosingMotion(means.normal, secondary, opening, slip_data.length)
+            closing = ClosingMotion(means.normal, secondary, opening, slip_data.closing_length)
             slips = replace(slips, total=slips.total + symmetric * closing.vector, closing=closing, symmetric=symmetric)
             for (substitution, _), weights in zip(slip_data.substitutions, functions, strict=True):
                 substitution = replace(substitution, functions=weights)
@@ -340,14 +346,14 @@ class WeightedMortar(Formulation):
         points = self.linearised_points(candidates, pairing, rows, config, normals, closest=True)
         integrals = [csr_array(nodal_map.T @ assembled(blocks, size)[:, rows]) for blocks in functions]
         weights, *substitute_weights = (scaled(matrix, 1.0 / means.weight) for matrix in integrals)
-        mean = csr_array(assembled(tests, size)[:, rows])
+        test_weights = csr_array(assembled(tests, size)[:, rows])
         separate_normals: DeformedSide | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
             all_nodes = np.arange(len(self.secondary.points))
             separate_normals = self.linearised_points(self.node_candidates, pairing, all_nodes, config, self.normals)
         elif self.normals == "secondary":
             separate_normals = config.deformed(self.secondary, self.points)
-        linearised = points, weights, means.normal, multiplier, mean, separate_normals
+        linearised = points, weights, means.normal, multiplier, test_weights, separate_normals
         differences = [csr_array(substitute - weights) for substitute in substitute_weights]
         return LinearisedPoints(self.secondary, *linearised), differences
 
@@ -383,20 +389,20 @@ class WeightedMortar(Formulation):
         return gap / np.where(cosine > 0.0, cosine, 1.0), direction
 
     def _slips(
-        self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], means: Means
+        self, directions: Sequence[Array], no_slip: list[tuple[Array, Mask]], means: Means
     ) -> tuple[tuple[csr_array, ...], list[tuple[Substitution, Coverage]]]:
         """Return the rows (m, n_dofs) of the slips along tangents (m, dim), and the additional slips in held directions.
 
         Usually the rows are those of the mean relative motion. If both sides are held at a node in a direction, as in a
         plane of symmetry, the mean in this direction would contain only the motion of the other side near the plane. The
-        functions of neighbouring nodes then replace that of the node. `without_slip` are the directions and nodes
+        functions of neighbouring nodes then replace that of the node. `no_slip` are the directions and nodes
         `directions_without_slip`. The coverage with these functions follows each `Substitution`.
         """
         coverage, D, _, weight, motion, *_ = means
         rows, substitutions = [rows_of(motion, direction) for direction in directions], []
         dim = self.points.shape[1]
-        held = np.zeros((len(weight), dim, dim))
-        for axis, nodes in without_slip:
+        held_projectors = np.zeros((len(weight), dim, dim))
+        for axis, nodes in no_slip:
             if not (nodes & coverage.with_gap).any():
                 continue
             substitute = self._coverage(*coverage[:2], coverage.with_gap & ~nodes, coverage.nodal_map)
@@ -408,9 +414,9 @@ class WeightedMortar(Formulation):
                 rows[k] = csr_array(rows[k] + rows_of(difference, cosine[:, None] * axis))
             secondary = csr_array(scaled(csr_array(D_substitute - D), 1.0 / weight)[:, self.secondary.points])
             substitutions.append((Substitution(axis, nodes, secondary, difference), substitute))
-            held[nodes] += np.einsum("md,me->mde", axis[nodes], axis[nodes])
-        # Slip is computed only along tangents whose component that supports do not hold is longer than FACING.
-        is_free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FACING**2 for t in directions]
+            held_projectors[nodes] += np.einsum("md,me->mde", axis[nodes], axis[nodes])
+        # Slip is computed only along tangents whose component normal to all held directions is at least FACING long.
+        is_free = [1.0 - np.einsum("md,mde,me->m", t, held_projectors, t) >= FACING**2 for t in directions]
         rows = [scaled(matrix, np.where(can_slip, 1.0, 0.0)) for matrix, can_slip in zip(rows, is_free, strict=True)]
         return tuple(rows), substitutions
 
@@ -455,8 +461,9 @@ class WeightedMortar(Formulation):
     def _nodal_map(self, with_gap: Mask, held: Mask) -> csr_array:
         """Return the map (m, m) from independent to nodal values of the multiplier field.
 
-        The value at a node in `held` (m,) is the weighted mean over those nodes in `with_gap` (m,) of its facets that are not
-        held. If there are none, it is independent.
+        The values at nodes outside `held` (m,) are independent. The value at a held node is the mean of those at the nodes of
+        its facets that are in `with_gap` (m,) and not held; facets are weighted with the integrals of its test function. If
+        there are no such nodes, it is independent.
         """
         entries = []
         for block, full in zip(self.secondary.blocks, self._full_weights, strict=True) if held.any() else ():
@@ -492,8 +499,8 @@ class WeightedMortar(Formulation):
     def _mean_normals(self, overlap: Overlap, config: Configuration) -> Array:
         """Return unit means (m, dim) of the opposite primary normals; at unpaired nodes, the mean over all nodes.
 
-        Against an obstacle they are the normals opposite the nodes themselves, which lie in the planes of symmetry of the
-        model.
+        Against an obstacle they are its normals at the projections of the nodes, so that normals at nodes in a plane of
+        symmetry lie in this plane.
         """
         if isinstance(self.primary, RigidSide):
             positions = (self.points + config.displacement)[self.secondary.points]
@@ -589,14 +596,14 @@ class WeightedPressures(NodalField):
 
     def pressure(self, force: Array) -> Array:
         """Return forces divided by areas; at mid-side nodes without a gap, means of the pressures at the corners."""
-        return self._at_nodes(force / self.weight, only_without_gap=True)
+        return self._at_nodes(force / self.weight, keep_with_gap=True)
 
     @property
     def covered(self) -> Array:
         """Covered fraction of the nodal areas; at mid-side nodes without a gap, the mean of the corners."""
         has_area = np.isfinite(self.weight) & (self.full_areas > 0.0)
         fraction = np.divide(self.weight, self.full_areas, out=np.zeros_like(self.weight), where=has_area)
-        return self._at_nodes(fraction, only_without_gap=True)
+        return self._at_nodes(fraction, keep_with_gap=True)
 
     def side_pressure(self, force: Array) -> Array:
         """Return the forces divided by the complete areas of the test functions; see `_at_nodes`.
@@ -606,17 +613,17 @@ class WeightedPressures(NodalField):
         """
         return self._at_nodes(np.divide(force, self.full_areas, out=np.zeros_like(force), where=self.full_areas > 0.0))
 
-    def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
+    def _at_nodes(self, coefficients: Array, keep_with_gap: bool = False) -> Array:
         """Return the nodal values (m,) of a field with `coefficients` (m,) of the test functions.
 
         They are the coefficients themselves, except at mid-side nodes of quadratic facets, where the functions of the corners
-        do not vanish. With `only_without_gap`, they are also the coefficients at mid-side nodes that have gaps.
+        do not vanish. With `keep_with_gap`, mid-side nodes that have gaps keep their coefficients, too.
         """
         coefficients = self.nodal_map @ coefficients
         values = coefficients.copy()
         for corners, T, local in self.quadratic:
             with_gaps = T[corners:].any()
-            if only_without_gap and with_gaps:
+            if keep_with_gap and with_gaps:
                 continue
             middles, T_middles = local[:, corners:], T[:, corners:]
             values[middles] = coefficients[local] @ T_middles

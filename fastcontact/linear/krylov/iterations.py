@@ -21,8 +21,8 @@ from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_PER_ENTRY
 Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
 # Number of search directions that the conjugate residual method stores. The image of a new direction is made orthogonal to
-# their images. With 3, "modulus ratio 0.0001" with friction takes 57 iterations instead of 54 (robustness table, 3 000
-# unknowns).
+# their images. With 3, "modulus ratio 0.0001" with friction takes 57 iterations (54 with 20; `fastcontact
+# bench robustness`, 3 000 unknowns).
 STORED_DIRECTIONS = 20
 # A step of the conjugate residual method has failed (stagnation) if the norm of the residual remains above this fraction of
 # the previous norm. Without it, `test_conjugate_residuals_progress_where_the_image_of_the_residual_is_orthogonal_to_it`

@@ -26,7 +26,8 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, compose, f
 from fastcontact.linear.springs import Springs
 
 # Smallest stiffening factor of a node for which the smoother and the coarser levels are corrected, see `stiffened_nodes`.
-# Without the correction, "modulus ratio 0.0001" takes 163 iterations instead of 18 (robustness table, 3 000 unknowns).
+# Without the correction, "modulus ratio 0.0001" takes 163 iterations (18 with it; `fastcontact bench robustness`,
+# 3 000 unknowns).
 SMALLEST_STIFFENING = 4.0
 
 
@@ -66,7 +67,7 @@ class ConstrainedHierarchy:
         if reduced is not None and not reduced.rows.nnz:  # The springs act only on supported unknowns or on pivots.
             reduced = None
         if elimination is None and reduced is None:
-            self.hierarchy.coarse.set(None)
+            self.hierarchy.coarse.factorise(None)
             self.hierarchy.set_bounds()
             return
         self._change_levels(elimination, reduced)
@@ -87,7 +88,7 @@ class ConstrainedHierarchy:
             finest.springs = springs.scaled(1.0, dtype)
             changes.append(SymmetricChange.of_springs(springs, len(self.A.rows)))
         if finest.P is None:
-            self.hierarchy.coarse.set(csc_array(sum(change.matrix() for change in changes)))
+            self.hierarchy.coarse.factorise(csc_array(sum(change.matrix() for change in changes)))
             return
         diagonals = [change.diagonal() for change in changes]
         stiffened = None if elimination is None else self._stiffened_nodes(diagonals[0], elimination)
@@ -97,7 +98,7 @@ class ConstrainedHierarchy:
         change = sum_of_changes(*(change.galerkin_product(finest.P) for change in changes))
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
-                self.hierarchy.coarse.set(change.padded(np.arange(level.n // change.size)).tocsc())
+                self.hierarchy.coarse.factorise(change.padded(np.arange(level.n // change.size)).tocsc())
                 return
             self._change_diagonal(level, change)
             level.change = change.rows(dtype)
@@ -106,7 +107,7 @@ class ConstrainedHierarchy:
     def _restore(self) -> None:
         """Restore the levels to their state without equations and springs."""
         for level, nodes, old in self._saved:
-            level.inverse.reshape(-1, old.shape[1])[nodes] = old
+            level.inverse_diagonal.reshape(-1, old.shape[1])[nodes] = old
         self._saved.clear()
         for level in self.hierarchy.levels:
             level.eliminated = level.change = level.springs = None
@@ -160,8 +161,8 @@ class ConstrainedHierarchy:
         """Add the diagonal blocks of `change` to those of a level, update their inverses, and save the old inverses."""
         size, nodes = len(level.A.rows), change.nodes
         blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel() + change.diagonal()
-        inverse = np.empty(blocks.size, level.inverse.dtype)
+        inverse = np.empty(blocks.size, level.inverse_diagonal.dtype)
         cycle_kernels.invert_blocks(blocks, size, inverse)
-        inverses = level.inverse.reshape(-1, size**2)
+        inverses = level.inverse_diagonal.reshape(-1, size**2)
         self._saved.append((level, nodes, inverses[nodes].copy()))
         inverses[nodes] = inverse.reshape(-1, size**2)

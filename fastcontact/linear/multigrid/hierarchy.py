@@ -33,7 +33,8 @@ class Hierarchy:
     Parameters
     ----------
     A : BlockMatrix
-        Matrix (n, n) of square blocks. The cycle has the precision of its `data`; the set-up uses double precision.
+        Matrix (n, n) of square blocks with ``len(A.rows)`` unknowns. The cycle has the precision of its `data`; the set-up
+        uses double precision.
     modes : ndarray (n, n_modes)
         Rigid-body modes, which span the near null space; zero at supported unknowns.
 
@@ -60,14 +61,15 @@ class Hierarchy:
             level.P, level.R, A, modes = coarser
             del coarser
         self.coarse = CoarseLevel(A.to_scipy().tocsc())
+        # Bounds without the constraint equations and springs that `ConstrainedHierarchy` may add to the levels.
         self._bounds_without_equations = [level.bound for level in self.levels]
         self.set_bounds()
 
     def renewed(self, A: BlockMatrix) -> Hierarchy | None:
-        """Return a hierarchy for a matrix A with the same pattern that reuses the coarser levels.
+        """Return a hierarchy with a new finest level for a matrix A of the same pattern, and with the present coarser levels.
 
-        It is a symmetric preconditioner of A, and its set-up costs a fifth of that of a complete one. The result is None if
-        there are no coarser levels, or if A has a different precision.
+        Its cycle is a symmetric preconditioner of A, and its set-up costs a fifth of that of a complete hierarchy. The result
+        is None if there are no coarser levels, or if A has a different precision.
         """
         if len(self.levels) == 1 or A.data.dtype != self.dtype:
             return None
@@ -84,9 +86,9 @@ class Hierarchy:
         size = len(A.rows)
         matrix = replace(A, data=A.data.astype(self.dtype, copy=False), low=None)
         diagonal = matrix.diagonal_part(matrix.data)
-        inverse = np.empty_like(diagonal)
-        cycle_kernels.invert_blocks(diagonal, size, inverse)
-        level = Level(matrix, diagonal, inverse, 1.0)
+        inverse_diagonal = np.empty_like(diagonal)
+        cycle_kernels.invert_blocks(diagonal, size, inverse_diagonal)
+        level = Level(matrix, diagonal, inverse_diagonal, 1.0)
         level.bound = SAFETY_FACTOR * level.largest_eigenvalue()
         return level
 
@@ -97,29 +99,29 @@ class Hierarchy:
         from pyamg.aggregation.aggregate import standard_aggregation
         from pyamg.aggregation.tentative import fit_candidates
 
-        size, n = len(A.rows), len(A.indptr) - 1
+        size, n_nodes = len(A.rows), len(A.indptr) - 1
         aggregates, _ = standard_aggregation(graph(A))
         n_coarse, n_modes = aggregates.shape[1], modes.shape[1]
         if not 0 < n_coarse * n_modes < level.n:
             return None
         T, coarse_modes = fit_candidates(aggregates, modes)
-        aggregate = np.full(n, -1, np.int32)
+        aggregate = np.full(n_nodes, -1, np.int32)
         member = np.flatnonzero(np.diff(aggregates.indptr))
         aggregate[member] = aggregates.indices
-        tentative = np.zeros((n, size * n_modes))
+        tentative = np.zeros((n_nodes, size * n_modes))
         tentative[member] = T.data.reshape(len(member), -1)
         del T
         omega = 4.0 / 3.0 / (level.bound / SAFETY_FACTOR)
         cols = (0,) * n_modes
-        neighbours = csr_matrix((np.ones(len(A.indices), bool), A.indices, A.indptr), shape=(n, n))
+        neighbours = csr_matrix((np.ones(len(A.indices), bool), A.indices, A.indptr), shape=(n_nodes, n_nodes))
         pattern = neighbours @ aggregates.astype(bool)
         pattern.sort_indices()
         # The prolongator is stored in the precision of the cycle before the coarse matrix is computed, so that the latter is
         # the Galerkin product with the prolongator that the cycle uses.
         columns, blocks = pattern.indices, np.empty(pattern.nnz * size * n_modes, self.dtype)
         parallel_for(
-            galerkin_kernels.smooth_prolongator, n, A.work_of_row, A.indptr, A.indices, A.storage, A.exact_data,
-            level.inverse, aggregate, tentative.ravel(), omega, pattern.indptr, columns, blocks, A.rows, cols,
+            galerkin_kernels.smooth_prolongator, n_nodes, A.work_of_row, A.indptr, A.indices, A.storage, A.exact_data,
+            level.inverse_diagonal, aggregate, tentative.ravel(), omega, pattern.indptr, columns, blocks, A.rows, cols,
         )  # fmt: skip
         del tentative
         P = BlockMatrix(pattern.indptr, columns, blocks, A.rows, cols)
@@ -153,7 +155,7 @@ class Hierarchy:
         self._factors = [chebyshev(bound) for bound in values]
 
     def set_bounds(self, estimated: bool = False) -> None:
-        """Set the bounds of the smoothers to those without equations and springs.
+        """Set the bounds of the smoothers to those without eliminated constraint equations and springs.
 
         If `estimated` is true, bounds are also estimated for the current matrices, and used if they are larger.
         """
@@ -162,24 +164,24 @@ class Hierarchy:
             for level, bound in zip(self.levels, self._bounds_without_equations, strict=True)
         ]
 
-    def cycle(self, number: int = 0) -> None:
-        """Apply one V-cycle, beginning at the level `number`, with a zero initial guess.
+    def cycle(self, index: int = 0) -> None:
+        """Apply one V-cycle, beginning at ``levels[index]``, with a zero initial guess.
 
-        The right-hand side is ``levels[number].b``, and the result is stored in ``levels[number].x``.
+        The right-hand side is ``levels[index].b``, and the result is stored in ``levels[index].x``.
         """
-        level = self.levels[number]
+        level = self.levels[index]
         if level.P is None:
             self.coarse.solve(level.b, level.x)
             return
-        factors = self._factors[number]
+        factors = self._factors[index]
         level.relax(level.b, *factors[0], True)
         for factor in factors[1:]:
             level.residual()
             level.relax(level.r, *factor)
         level.residual()
-        coarser = self.levels[number + 1]
+        coarser = self.levels[index + 1]
         level.restrict(coarser.b)
-        self.cycle(number + 1)
+        self.cycle(index + 1)
         level.correct(coarser.x)
         for factor in factors:
             level.residual()
@@ -187,39 +189,40 @@ class Hierarchy:
 
 
 def graph(A: BlockMatrix) -> csr_matrix:
-    """Return the graph (n, n) of a symmetric matrix A, with positive entries for its nonzero off-diagonal blocks."""
-    n, (start, columns) = len(A.indptr) - 1, (A.indptr, A.indices) if A.storage is ALL_BLOCKS else A.storage[:3:2]
-    rows = np.repeat(np.arange(n), np.diff(start))
+    """Return the graph (n_nodes, n_nodes) of a symmetric matrix A, with positive entries for nonzero off-diagonal blocks."""
+    n_nodes, (start, columns) = len(A.indptr) - 1, (A.indptr, A.indices) if A.storage is ALL_BLOCKS else A.storage[:3:2]
+    rows = np.repeat(np.arange(n_nodes), np.diff(start))
     coupled = A.data.reshape(-1, len(A.rows) ** 2).any(axis=1) & (columns != rows)
-    stored = csr_matrix((np.ones(int(coupled.sum()), np.int8), (rows[coupled], columns[coupled])), shape=(n, n))
+    ones = np.ones(int(coupled.sum()), np.int8)
+    stored = csr_matrix((ones, (rows[coupled], columns[coupled])), shape=(n_nodes, n_nodes))
     return stored + stored.T.tocsr()
 
 
-def column_pattern(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
+def column_pattern(P: BlockMatrix, n_columns: int) -> tuple[Numbers, Numbers, Numbers]:
     """Return the pattern of P by columns.
 
     Returns
     -------
-    start : ndarray of int (n + 1,)
-        Offsets of the n block columns.
+    start : ndarray of int (n_columns + 1,)
+        Offsets of the block columns.
     rows : ndarray of int (n_blocks,)
         Row of each block, in ascending order within a column.
-    numbers : ndarray of int (n_blocks,)
-        Number of each block in P.
+    blocks : ndarray of int (n_blocks,)
+        Index of each block in P.
     """
-    numbers = np.arange(len(P.indices), dtype=np.int32)
-    columns = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
+    blocks = np.arange(len(P.indices), dtype=np.int32)
+    columns = csr_matrix((blocks, P.indices, P.indptr), shape=(len(P.indptr) - 1, n_columns)).tocsc()
     return columns.indptr, columns.indices, columns.data
 
 
 def transposed(P: BlockMatrix, columns_of_P: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
-    """Return the transpose of P; `columns_of_P` is ``column_pattern(P, n)``."""
+    """Return the transpose of P; `columns_of_P` is ``column_pattern(P, n_columns)``."""
     blocks = P.data.reshape(-1, len(P.rows), len(P.cols))[columns_of_P[2]].transpose(0, 2, 1)
     return BlockMatrix(*columns_of_P[:2], blocks.ravel(), P.cols, P.rows)
 
 
 def galerkin_product(A: BlockMatrix, P: BlockMatrix, columns_of_P: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
-    """Return the Galerkin product ``P.T A P`` for a symmetric matrix A; `columns_of_P` is ``column_pattern(P, n)``."""
+    """Return the Galerkin product ``P.T A P`` for symmetric A; `columns_of_P` is ``column_pattern(P, n_columns)``."""
     n_coarse = len(columns_of_P[0]) - 1
     count, fine_count = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     work = len(A.indices) / max(1, n_coarse)

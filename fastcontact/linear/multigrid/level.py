@@ -27,18 +27,18 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
-# Number of Lanczos steps for the largest eigenvalue, and safety factor of its estimate. In the robustness table with 3 000
-# unknowns and friction, the base case takes 1 028 iterations instead of 22 with 3 steps, and tet4 28 instead of 15 without
-# the factor.
+# Number of Lanczos steps for the largest eigenvalue, and safety factor of its estimate. With 3 Lanczos steps, the
+# base case of `fastcontact bench robustness` (3 000 unknowns, with friction) takes 1 028 iterations (22 with 8); without the
+# factor, "tet4" takes 28 (15 with 1.08).
 LANCZOS_STEPS = 8
 SAFETY_FACTOR = 1.08
 # Ratio of the lower to the upper end of the interval of eigenvalues that is smoothed, and number of Chebyshev steps. In the
-# same table, "nu 0.499" takes 144 iterations instead of 109 with 1/4, and 163 with 2 steps; the base case 37 instead of 16
-# with 1/240.
+# same benchmark, with a ratio of 1/4 "nu 0.499" takes 144 iterations, and 163 with 2 steps (109 with 1/24 and 3 steps); with
+# 1/240 the base case takes 37 (16 with 1/24).
 SMOOTHED_FRACTION = 1 / 24
 DEGREE = 3
-# Largest number of unknowns of a level that is not coarsened further and whose inverse is computed. With 20, iterations in
-# the same table differ by at most two.
+# Largest number of unknowns of a level that is not coarsened further and whose inverse is computed. With 20, the
+# numbers of iterations in the same benchmark differ by at most two.
 COARSEST_SIZE = 200
 
 
@@ -50,7 +50,7 @@ class Level:
     ----------
     A : BlockMatrix
         Matrix (n, n) of the level.
-    diagonal, inverse : ndarray (n_nodes * size * size,)
+    diagonal, inverse_diagonal : ndarray (n_nodes * size * size,)
         Diagonal blocks D of the matrix, and their inverses for the smoother.
     bound : float
         Upper bound of the eigenvalues of ``D^-1 A`` [-].
@@ -76,7 +76,7 @@ class Level:
 
     A: BlockMatrix
     diagonal: AnyArray
-    inverse: AnyArray
+    inverse_diagonal: AnyArray
     bound: float
     P: BlockMatrix | None = None
     R: BlockMatrix | None = None
@@ -101,26 +101,30 @@ class Level:
 
     def without_equations(self) -> Level:
         """Return a copy without equations and springs, which shares the matrix and the transfer operators."""
-        inverse = np.empty_like(self.inverse)
-        cycle_kernels.invert_blocks(self.diagonal, len(self.A.rows), inverse)
-        return Level(self.A, self.diagonal, inverse, self.bound, self.P, self.R)
+        inverse_diagonal = np.empty_like(self.inverse_diagonal)
+        cycle_kernels.invert_blocks(self.diagonal, len(self.A.rows), inverse_diagonal)
+        return Level(self.A, self.diagonal, inverse_diagonal, self.bound, self.P, self.R)
 
-    def relax(self, r: AnyArray, first: float, second: float, from_zero: bool = False) -> None:
-        """Update `x` by a Chebyshev step (`cycle_kernels.relax`) for the residual r (n,), and set its eliminated unknowns."""
+    def relax(self, r: AnyArray, step_factor: float, residual_factor: float, from_zero: bool = False) -> None:
+        """Update `x` by a Chebyshev step for the residual r (n,), and set its eliminated unknowns.
+
+        The factors, those of `chebyshev`, multiply the last step and the preconditioned residual.
+        """
         real = r.dtype.type
-        self.chebyshev_step(r, real(first), real(second), self.d, self.x, from_zero)
+        self.chebyshev_step(r, real(step_factor), real(residual_factor), self.d, self.x, from_zero)
         if self.free_motions is not None:
-            self.free_motions.correct(r, second, self.d, self.x)
+            self.free_motions.correct(r, residual_factor, self.d, self.x)
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
 
     def chebyshev_step(
-        self, r: AnyArray, first: np.floating, second: np.floating, d: AnyArray, x: AnyArray, from_zero: bool
-    ) -> None:
+        self, r: AnyArray, step_factor: np.floating, residual_factor: np.floating, d: AnyArray, x: AnyArray, from_zero: bool,
+    ) -> None:  # fmt: skip
         """Apply `cycle_kernels.relax` to the last step `d` (n,) and the iterate `x` (n,), in place, without corrections."""
         rows = self.A.rows
         parallel_for(
-            cycle_kernels.relax, self.n // len(rows), NODES_PER_CELL, self.inverse, r, first, second, d, x, rows, from_zero,
+            cycle_kernels.relax, self.n // len(rows), NODES_PER_CELL, self.inverse_diagonal, r, step_factor, residual_factor,
+            d, x, rows, from_zero,
         )  # fmt: skip
 
     def residual(self) -> None:
@@ -196,7 +200,7 @@ class Level:
     @property
     def nbytes(self) -> int:
         """Memory of the level [bytes]."""
-        total = self.A.nbytes + self.diagonal.nbytes + self.inverse.nbytes + 4 * self.b.nbytes
+        total = self.A.nbytes + self.diagonal.nbytes + self.inverse_diagonal.nbytes + 4 * self.b.nbytes
         return total + sum(A.nbytes for A in (self.P, self.R) if A is not None)
 
 
@@ -225,7 +229,7 @@ class CoarseLevel:
     Attributes
     ----------
     matrix : csc_array (n, n)
-        The matrix A, without the change that `set` adds.
+        The matrix A, without the change that `factorise` adds.
     """
 
     def __init__(self, A: csc_array) -> None:
@@ -233,15 +237,15 @@ class CoarseLevel:
         self._lu: Any = None
         self._inverse = np.empty((self.n, self.n) if self.n <= COARSEST_SIZE else 0)
         self._changed = True
-        self.set(None)
+        self.factorise(None)
 
     @property
     def nbytes(self) -> int:
         """Memory of the inverse or of the factors [bytes]."""
         return self._inverse.nbytes if self._lu is None else 12 * int(self._lu.nnz)
 
-    def set(self, change: csc_array | None) -> None:
-        """Factorise the sum of the matrix and the symmetric matrix `change` (n, n); None means zero."""
+    def factorise(self, change: csc_array | None) -> None:
+        """Factorise or invert the sum of the matrix and the symmetric matrix `change` (n, n); None means zero."""
         if change is None and not self._changed:
             return
         self._changed = change is not None

@@ -36,13 +36,13 @@ from fastcontact.linear.protocol import MILD_CONTRAST, TOLERANCE, Counters, Moni
 from fastcontact.linear.springs import MAX_DIFFERENCE, Springs
 
 log = logging.getLogger("fastcontact")
-# Largest number of iterations of a linear solution. The hardest row of the robustness table (nu = 0.4999, 161 442 unknowns)
-# takes 295.
+# Largest number of iterations of a linear solution. The hardest case of `fastcontact bench robustness` (nu = 0.4999,
+# 161 442 unknowns) takes 295.
 MAX_ITERATIONS = 1000
 # Largest number of columns of K^-1 that are computed, each as the solution of one linear system. For more columns, a
 # factorisation is cheaper.
 MAX_COLUMNS = 300
-# Number of iterations between two calls of a monitor. With 10, "tet4" takes 21 iterations instead of 15.
+# Number of iterations between two calls of a monitor. With 10, "tet4" takes 21 iterations (15 with 2).
 MONITOR_INTERVAL = 2
 # Number of iterations before the first call of a monitor if `_contrast` is large, because the errors of soft parts are not
 # known earlier. The benchmark "nu 0.499" takes 123 iterations, and 132 with the first call after two iterations.
@@ -56,8 +56,9 @@ DISPLACEMENT_ERROR = 3e3
 COST_OF_CHANGE = 15
 # Even if the initial guess of a nonsymmetric system satisfies the tolerance, the iteration continues until the residual has
 # fallen by the factor WARM_REDUCTION, or to WARM_RESIDUAL times the tolerance. At most MAX_WARM_ITERATIONS are performed
-# after the tolerance has been reached: with one, "aspect ratio 20" takes 18 pairings instead of 9; without such iterations,
-# the residual of "modulus ratio 0.0001" with friction is 8e-7 instead of 5e-9 (robustness table, 3 000 unknowns). If
+# after the tolerance has been reached: with one, "aspect ratio 20" takes 18 pairings (9 with 10); without such iterations,
+# the residual of "modulus ratio 0.0001" with friction is 8e-7 (5e-9 with 10; `fastcontact bench robustness`, 3 000
+# unknowns). If
 # equations stiffen nodes strongly, this number is doubled, up to STORED_DIRECTIONS, each time the residual of an initial
 # guess exceeds WARM_REDUCTION times that of the previous initial guess.
 WARM_REDUCTION, WARM_RESIDUAL, MAX_WARM_ITERATIONS = 0.05, 1e-3, 10

@@ -11,7 +11,7 @@ import numpy as np
 from fastcontact.mesh.elements._element import AnyArray, Element, product, quadratic, with_midpoints
 from fastcontact.mesh.elements.lines import LINE2, LINE3
 from fastcontact.mesh.elements.triangles import TRI3, TRI6
-from fastcontact.mesh.quadrature import gauss_line, tensor_product, triangle, triangle_3_sides
+from fastcontact.mesh.quadrature import gauss_line, tensor_product, triangle, triangle_3_midpoints
 
 NODES, shape = product(np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)]), TRI3, LINE2)
 Z = NODES[:, 2]
@@ -20,7 +20,7 @@ TRIANGLE_CORNER = np.tile(np.arange(3), 2)  # number of the triangle corner belo
 WEDGE6 = Element(
     "wedge6", NODES, edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
     facets=((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), shape=shape,
-    quadrature=tensor_product(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, xdmf=0x8,
+    quadrature=tensor_product(triangle_3_midpoints(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, xdmf=0x8,
     quadratic="wedge15", dilatation=0,
 )  # fmt: skip
 # Ends of the edges of the two triangles, and the coordinate z = -1 or 1 of each edge.

@@ -83,8 +83,9 @@ class ModelContact(ModelConnections):
               for example of a press fit [length]. It is a number or a function from reference positions (n, dim) on the
               secondary side to lengths (n,).
             - ``clearance_primary``: the same quantity as a function of positions on the primary side.
-            - ``clearance_ramp``: history of both clearances, as pairs (instant, multiplier); by default they are constant.
-            - ``friction_ramp``: history of the coefficient of friction, as pairs (instant, multiplier).
+            - ``clearance_ramp``: history of both clearances, as pairs (load factor, multiplier); by default they are
+            constant.
+            - ``friction_ramp``: history of the coefficient of friction, as pairs (load factor, multiplier).
             - ``surface_smoothing``: whether gaps are measured between the smooth surfaces that facets of curved sides
               approximate; True by default, except for node-to-segment contact and at rigid obstacles.
             - ``excluded``: groups whose nodes carry no contact pressure. In the node-to-segment formulation and in mortar

@@ -273,7 +273,7 @@ class ModelInitialStates(ModelLoads):
         field, forces = self.material_field(), []
         for temperature in self.temperatures:
             rise = temperature.rise(self.mesh)
-            missing = field.n_cells_without_expansion(self.mesh, rise)
+            missing = field.n_heated_cells_without_expansion(self.mesh, rise)
             if missing:
                 raise ModelError(
                     f"{temperature.name} acts on {missing} solid cells whose material has no coefficient of thermal "

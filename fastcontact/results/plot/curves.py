@@ -90,7 +90,7 @@ def pressure_profile(
     n_profiles = sum(line.get_marker() == "o" for line in ax.lines)
     colour = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:pink")[n_profiles % 6]
     order = np.argsort(contact.place, kind="stable")
-    position, flat = contact.place[order], contact.coordinates.shape[1] == 2
+    position, is_2d = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
     low, high = _shown_range(contact, curves)
     limits = (low, high, *(ax.get_xlim() if n_profiles else ()))
@@ -104,13 +104,13 @@ def pressure_profile(
     peak = f"$p_{{max}}$ = {value_text(contact.pressure_max, units, 'pressure')}"
     label = f"{contact.formulation.replace('_', '-')}: {peak}"
     pressure = contact.pressure[order][shown]
-    ax.plot(position[shown], pressure, "o-" if flat else "o", color=colour, ms=4, lw=0.8, label=label)
+    ax.plot(position[shown], pressure, "o-" if is_2d else "o", color=colour, ms=4, lw=0.8, label=label)
     if stress is not None:
         label = r"$-n \cdot \sigma \cdot n$ at the nodes"
         ax.plot(position[shown], -stress[order][shown], "x", color="tab:red", ms=5, label=label)
     _mark_edges(ax, contact, position, units, colour)
     start = "axis" if contact.measured_from_axis else "middle of the contact"
-    distance = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
+    distance = "distance along the surface" if is_2d and not contact.measured_from_axis else "distance"
     ax.set(xlabel=axis_label(f"{distance} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
     ax.set(ylabel=axis_label("contact pressure", units, "pressure"))
     ax.set(title=title or ax.get_title() or f"Contact '{contact.name}'")
@@ -144,11 +144,11 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
     The limits lie at most 2 % beyond the farthest node or the largest radius. They include both sides of the middle if
     the surface has nodes on both sides.
     """
-    closed = np.abs(contact.place[contact.active]).max(initial=0.0)
+    farthest_closed = np.abs(contact.place[contact.active]).max(initial=0.0)
     radii = [value for value in (*contact.radius, *(c.radius for c in curves.values())) if np.isfinite(value)]
     farthest = float(np.abs(contact.place).max(initial=0.0))
-    reach = 1.35 * max([closed, *radii]) or 1.02 * farthest or 1.0
-    reach = min(reach, 1.02 * max(farthest, *radii, 1e-300)) if closed else reach
+    reach = 1.35 * max([farthest_closed, *radii]) or 1.02 * farthest or 1.0
+    reach = min(reach, 1.02 * max(farthest, *radii, 1e-300)) if farthest_closed else reach
     low, nearest = contact.place.min(initial=0.0), float(np.abs(contact.place).min(initial=np.inf))
     if nearest > 0.2 * reach and not curves:  # on a ring, the range between the axis and the bore would be empty
         return nearest - 0.05 * (reach - nearest), reach
@@ -160,16 +160,16 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
-    closed, one_sided = contact.place[contact.active], position.min(initial=0.0) >= 0.0
-    centre = 0.0 if one_sided else 0.5 * float(closed.min() + closed.max())
-    before = contact.place[contact.place < closed.min()]
+    closed_places, one_sided = contact.place[contact.active], position.min(initial=0.0) >= 0.0
+    centre = 0.0 if one_sided else 0.5 * float(closed_places.min() + closed_places.max())
+    before = contact.place[contact.place < closed_places.min()]
     label = f"edges: {centre - inside:.4g} and {value_text(centre + inside, units, 'length')}"
     if one_sided and before.size:  # the contact is a ring around an open middle
-        ax.axvspan(before.max(), closed.min(), color=colour, alpha=0.15, lw=0)
+        ax.axvspan(before.max(), closed_places.min(), color=colour, alpha=0.15, lw=0)
         outer = f"{inside:.4g} to {value_text(outside, units, 'length')}"
-        label = f"edges: {before.max():.4g} to {closed.min():.4g}, and {outer}"
+        label = f"edges: {before.max():.4g} to {closed_places.min():.4g}, and {outer}"
     elif abs(centre) <= 0.01 * outside:
-        # The difference of the bounds may be smaller than the distance of two nodes, because constraints may lie between
+        # The difference of the bounds may be smaller than the distance between two nodes, because constraints may lie between
         # nodes. Nodes beyond the contact are excluded, because on a curved surface their distance from the middle along the
         # tangent may be the same as that of nodes in contact.
         place = np.abs(contact.place)
@@ -214,7 +214,7 @@ def axis_stress(
     pair : str
         Name of the contact pair. The depth is measured from its node nearest to the middle of the contact.
     theories : mapping of str to object, optional
-        Theories, by their labels in the legend: objects with the method ``stress_on_axis(depth)``, such as
+        Theories, by their labels in the legend: objects with the method ``stress_on_axis(depth)``, such as the result of
         `analytic.hertz_point`. If Poisson's ratios of the two bodies of a theory differ, both have their own curves.
     title, units, ax
         Described for `pressure_profile`.
@@ -333,7 +333,7 @@ def _body_sides(mesh: Mesh, nodes: AnyArray, origin: Array, direction: Array) ->
 
 
 # Largest number of steps for which `contact_zones` shows the number of closed nodes.
-MOST_COUNTS = 20
+MAX_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 
 
@@ -360,9 +360,10 @@ def history(
     pair : str
         Name of a contact pair.
     law : object with the method ``at_approach(d)``, optional
-        A theory, such as `analytic.hertz_point`; it is only plotted if `approach` is given.
+        A theory, such as the result of `analytic.hertz_point`; it is only plotted if `approach` is given.
     approach : float, optional
-        Approach of the bodies at load factor 1 [length]; if it is given, the abscissa is the approach.
+        Approach of the bodies at load factor 1 [length]; if it is given, the abscissa is the approach, which is assumed to
+        be proportional to the load factor.
     share : float
         Fraction of the contact of the theory that the model represents, for example 0.25 for a quarter [-].
     title, units
@@ -491,7 +492,7 @@ def contact_zones(
     for state, nodes in (("open", ~closed), (closed_state, closed & ~sliding), ("sliding", sliding)):
         if nodes.any():
             axes.plot(x[nodes], y[nodes], "o" if state != "open" else ".", ms=4, color=STATES[state], label=state)
-    stride = -(-len(contacts) // MOST_COUNTS)
+    stride = -(-len(contacts) // MAX_COUNTS)
     for step, contact in list(zip(steps, contacts, strict=True))[(len(contacts) - 1) % stride :: stride]:
         anchor = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom"}
         axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=8, **anchor)

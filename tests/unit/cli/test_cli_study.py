@@ -70,7 +70,7 @@ def test_values_of_a_parameter(text, values):
 @pytest.mark.parametrize(
     ("command", "told"),
     [
-        (["converge", "forma04a", "--levels", "50"], "give at most"),
+        (["converge", "forma04a", "--levels", "50"], "reduce the number of levels to"),
         (["converge", "sphere-on-plane-3d", "--levels", "30"], "of memory, of which this machine has"),
         (["sweep", "forma04a", "--set", "material[0].E=1:2:20000000"], "a study of 20000000 runs is too large"),
         (["sweep", "forma04a", "--set", "material[0].E=1:1e400:3"], "a range is FIRST:LAST:COUNT"),

@@ -30,7 +30,7 @@ def solved(case):
     ("clearance = [1.0]", "the clearance of contact 'pair' is \\[1.0\\], which is not a finite number"),
     ("clearance = nan", "the clearance of contact 'pair' is nan"),
     ("clearance_ramp = [[0, 0], [1, 1]]", "has a clearance_ramp, but no clearance"),
-    ("clearance = 0.1\nclearance_ramp = [[1, 0], [1, 1]]", "clearance_ramp of contact 'pair'.* ascending"),
+    ("clearance = 0.1\nclearance_ramp = [[1, 0], [1, 1]]", "clearance_ramp of contact 'pair'.* increasing"),
     ('excluded = "NOWHERE"', "NOWHERE"),
     ('excluded = "LOWER_BOTTOM"', "has no nodes on the secondary side 'CONT_UPPER'"),
     ('penalty = "stiff"', "the penalty of contact 'pair' is 'stiff'"),

@@ -42,7 +42,7 @@ RULES = {
     "gauss_square": (rules.gauss_square(2), on_box, 3),
     "triangle_1": (rules.triangle(1), on_triangle, 1),
     "triangle_3": (rules.triangle(2), on_triangle, 2),
-    "triangle_3_sides": (rules.triangle_3_sides(), on_triangle, 2),
+    "triangle_3_midpoints": (rules.triangle_3_midpoints(), on_triangle, 2),
     "triangle_6": (rules.triangle(4), on_triangle, 4),
     "triangle_7": (rules.triangle(5), on_triangle, 5),
     "gauss_cube": (rules.gauss_cube(3), on_box, 5),

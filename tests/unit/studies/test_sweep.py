@@ -133,7 +133,7 @@ def test_a_quantity_without_theory_has_no_ratio(root):
     )
     assert found.units["force"] == "N/mm"
     texts = [text.get_text() for ax in found.figure().axes for text in ax.texts]
-    assert "no theory of the contact force" in texts
+    assert "no theoretical value of the contact force" in texts
     force = drawn(found)["contact force"]
     low, high = force.get_ylim()
     assert high - low > 0.1 * high  # round-off is no trend
