@@ -524,6 +524,7 @@ class WeightedMortar(Formulation):
 
         `functions` are arrays (n_facets, k, k) of coefficients in terms of the shape functions, one for each block.
         """
+        assert isinstance(self.primary, Surface)
         integrals = np.zeros((len(self.secondary.points), self.points.shape[1]))
         primary = config.deformed(self.primary, self.points)
         normals = primary.facet_normals if self.normals == "facet" else primary.smooth_normals
