@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
 
 from fastcontact._tools.records import replace
 from fastcontact.analysis.criteria import NOTABLE, WARNING_ERROR, WARNING_RATIO, Criteria
@@ -98,13 +99,13 @@ def result_warnings(
         oscillation = oscillation or list(_quadrature_error(pair, configuration, contact, problem.model))
         pressures = [*unresolved, *oscillation]
         index, displacement, contacts = peaks[name]
-        at_edge = list(_pressure_peak_at_edge(pair, last, contact))
+        at_edge = list(_pressure_peak_at_edge(pair, last, contact, state.u))
         if not pressures and index != last.index:
             peak = contacts[name]
             at_peak = replace(Configuration.displaced(displacement), pose=pose_of(peak))
             texts = _unresolved(problem, pair, at_peak, peak, state)
             texts += pressure_oscillation(pair, peak, problem.model)
-            texts += [] if at_edge else _pressure_peak_at_edge(pair, last, peak)
+            texts += [] if at_edge else _pressure_peak_at_edge(pair, last, peak, displacement)
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += pressures or _shear_oscillation(pair, contact)
         warnings += [*at_edge, *_sliding_past_ends(pair, contact)]
@@ -541,7 +542,9 @@ def _modulus(model: Model, points: NDArray[np.integer]) -> float:
     return float(np.concatenate(moduli).mean())
 
 
-def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -> Iterator[str]:
+def _pressure_peak_at_edge(
+    pair: Formulation, last: StepResult, contact: ContactResult, displacement: Array
+) -> Iterator[str]:
     """Yield a warning where the largest nodal pressure is a peak near the edge of the contact that facets do not resolve.
 
     Past yield, the pressure drops within a facet at the edge, where the nodal pressures overshoot, and undershoot and
@@ -551,8 +554,9 @@ def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: Contact
 
     In elastic bodies, there is such a peak below the rounded edge of a punch. With 1.4, 1.8 and 2.7 quad8 facets between the
     beginning of the rounding and the edge of the contact, the largest pressure was wrong by 27, 5 and 2 % with the continuous
-    formulation and by 12, 6 and 1 % with mortar, at most half of the difference from the means. At corners, which no facets
-    resolve, there is no such warning.
+    formulation and by 12, 6 and 1 % with mortar, at most half of the difference from the means. Where the rounding turns by
+    more than a quarter of CORNER per facet, so that contact ends in its first facet, the peak was too small by up to 66 %. At
+    corners, which no facets resolve, there is no such warning.
     """
     plastic, side = last.cell_fields.get("plastic_strain"), pair.secondary
     peak, is_open = int(contact.pressure.argmax()), ~contact.active & ~pair.excluded[side.points]
@@ -579,19 +583,57 @@ def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: Contact
             f"a corner, the true maximum is between both: use smaller facets{remedy}"
         )
         return
-    normals = [
-        DeformedSide(side, pair.points).nodal_normals,
-        *([contact.normal] if isinstance(pair.primary, Surface) else []),
-    ]
+    own_normals = DeformedSide(side, pair.points).nodal_normals
+    normals = [own_normals, *([contact.normal] if isinstance(pair.primary, Surface) else [])]
     at_corner = any((normal[near] @ normal[peak]).min() < SAME_DIRECTION for normal in normals)
     # If all of the contact is near its edge, the peak may be that in the middle.
     reaches_inside = (contact.active & (side.extended_adjacency @ near_open == 0)).any()
-    if pair.options.cohesion is None and reaches_inside and not at_corner and np.isfinite(contact.gap[near]).all():
-        yield (
-            f"{text}. Facets are too large for such a peak, which may be wrong by {0.5 * (contact.pressure_max - mean):.2g}. "
-            "It needs four or more, for example between the beginning of the rounding of a punch and the edge of the "
-            f"contact: use smaller facets of '{side.group}'"
+    facing, closed = np.isfinite(contact.gap), contact.active & near
+    if pair.options.cohesion is not None or not reaches_inside or not (at_corner or facing[near].all()):
+        return
+    error = f"may be wrong by {0.5 * (contact.pressure_max - mean):.2g}"
+    if at_corner:
+        if not facing[side.node_adjacency @ closed > 0].all() or not _ends_on_rounding(pair, closed, displacement):
+            return
+        cosine = np.einsum("nd,nd->n", own_normals, contact.normal)[near & facing]
+        opening = np.degrees(np.arccos(np.clip(-cosine, -1.0, 1.0)))
+        if np.cos(np.radians(opening.max())) >= SAME_DIRECTION:  # both sides turn in the same way, as around a shaft
+            return
+        i, j = side.node_adjacency[near & facing][:, near & facing].nonzero()
+        error = (
+            "may be several times as large. At the edge, the sides turn away from each other by up to "
+            f"{np.abs(opening[i] - opening[j]).max():.0f} degrees within a facet, with facets of length "
+            f"{side.largest_diameters(pair.points)[peak]:.2g}, which do not resolve a rounding"
         )
+    groups = f"'{side.group}'" + (f" and '{pair.primary.group}'" if isinstance(pair.primary, Surface) else "")
+    yield (
+        f"{text}. Facets are too large for such a peak, which {error}. It needs four or more, for example between the "
+        f"beginning of the rounding of a punch and the edge of the contact: use smaller facets of {groups}"
+    )
+
+
+def _ends_on_rounding(pair: Formulation, closed: Mask, displacement: Array) -> bool:
+    """Return whether the contact ends on the rounding of a side, and not at a corner.
+
+    At a corner, a side turns by more than the angle of SAME_DIRECTION at a single node in contact. A rounding also turns at
+    open nodes, and between the nodes of curved facets. `closed` are the nodes (m,) of the secondary side in contact near the
+    edge, and those of the primary side are the ones closest to them.
+    """
+    positions, sides = pair.points + displacement.reshape(pair.points.shape), [(pair.secondary, closed)]
+    if isinstance(pair.primary, Surface):
+        _, closest = KDTree(positions[pair.secondary.points]).query(positions[pair.primary.points])
+        sides.append((pair.primary, closed[closest]))
+    turn, bend = 0.0, 0.0
+    for side, nodes in sides:
+        normal, is_node = (deformed := DeformedSide(side, pair.points)).facet_normals, side.node_weights > 0.0
+        means = deformed.nodal_normals[side.all_local], unit_vectors(normal.sum(axis=1))[:, None]
+        at_node, in_facet = (2.0 * np.arccos(np.clip((normal * mean).sum(axis=2), -1.0, 1.0)) for mean in means)
+        used = nodes[side.all_local] & is_node
+        turn = max(turn, largest(at_node[used]))
+        bend = max(bend, largest(in_facet[is_node & used.any(axis=1, keepdims=True)]))
+    smooth = np.arccos(SAME_DIRECTION)
+    # At the beginning of a rounding, straight facets turn by half as much as at its other nodes.
+    return bool(turn <= smooth and max(turn, bend) > 0.5 * smooth / MIN_FACETS_ACROSS_RADIUS)
 
 
 def _alternation(side: Surface, values: Array, selected: Mask) -> tuple[Mask, float, Array]:

@@ -1,8 +1,10 @@
 """Bodies against rigid obstacles: the half sphere on a plane, Hertz in a box, the flat punch, friction on a moving plane."""
 
+import re
+
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -162,6 +164,30 @@ def test_a_pressure_peak_below_a_rounded_edge_that_facets_do_not_resolve_is_told
     with pytest.warns(fc.FastcontactWarning, match="Facets are too large for such a peak, which may be wrong by"):
         pressed(0.2)
     assert pressed(0.04) == pytest.approx(28.9, rel=0.03)
+
+
+@pytest.mark.parametrize("side", ["alone", "secondary", "primary"])
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+@pytest.mark.parametrize("edge", ["rounded", "inclined", "box"])
+def test_a_rounded_edge_of_three_facets_is_told_and_a_corner_is_not(edge, element, side):
+    """Fine meshes have peaks above 19 at the rounding of radius 1; those at corners are infinite."""
+    pad = fc.generate.block((12.0, 6.0), (36, 12), element)
+    beyond, depth = np.maximum(np.abs(pad.points[:, 0] - 6.0) - 5.0, 0.0), pad.points[:, 1]
+    height = {"rounded": 1.0 - np.sqrt(1.0 - 0.99 * beyond**2), "inclined": 0.7 * beyond, "box": 0.0 * beyond}[edge]
+    pad = pad.replace(points=pad.points + np.outer(height * (1.0 - depth / 6.0), (0.0, 1.0)))
+    pad = pad.merged_groups("UNDER", ["BOTTOM", "LEFT", "RIGHT"] if edge == "box" else ["BOTTOM"])
+    if side == "alone":
+        model = elastic_model(pad, TOP={"x": 0.0, "y": -0.02})
+        model.add_obstacle("c", secondary="UNDER", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    else:
+        base = fc.generate.block((24.0, 8.0), (72, 16), element, origin=(-6.0, -8.0))
+        model = elastic_model(united(P_=pad, B_=base), P_TOP={"x": 0.0, "y": -0.05}, B_BOTTOM="xy")
+        one, other = ("P_UNDER", "B_TOP") if side == "secondary" else ("B_TOP", "P_UNDER")
+        model.add_contact("c", secondary=one, primary=other)
+    last = fc.solve(model, 1)[-1]
+    assert last.contact["c"].pressure_max < 17.0 or edge != "rounded"
+    told = [text for text in last.warnings if re.search(r"several times as large.* degrees within a facet", text)]
+    assert len(told) == (edge == "rounded")
 
 
 @pytest.mark.filterwarnings("ignore:.*nodal pressures oscillate", "ignore:the energy of these load steps")
