@@ -472,3 +472,28 @@ def test_a_ring_that_contact_alone_holds_slides_as_on_weak_springs():
         assert max(abs(moment) / 10.0, abs(force[1].sum())) < 1e-6 * pull
         work.append(last.work["friction_work"])
     np.testing.assert_allclose(work, work[2], rtol=3e-3)
+
+
+@pytest.mark.filterwarnings(
+    "ignore:nothing determines the position", "ignore:.*of the work of friction is done at nodes"
+)
+def test_a_hot_hub_on_a_weak_spring_shrinks_in_few_iterations():
+    shaft = fc.generate.block((25.0, 60.0), (4, 18), "quad4", name="SHAFT")
+    hub = fc.generate.block((35.0, 20.0), (5, 8), "quad4", (25.0, 20.0), name="HUB")
+    forces, iterations = [], []
+    for stiffness, limit in ((0.0, 0.01), (1.0, 0.01), (1.0, 1.0)):
+        model = fc.Model(united(SHAFT_=shaft, HUB_=hub), "axisymmetric")
+        model.add_material(fc.LinearElastic(E=210e3, nu=0.3), "SHAFT")
+        model.add_material(fc.LinearElastic(E=100e3, nu=0.25, expansion=1.8e-5), "HUB")
+        model.fix("SHAFT_BOTTOM", "y")
+        if stiffness:
+            model.add_spring("HUB_BOTTOM", y=stiffness)
+        model.add_contact("fit", secondary="HUB_LEFT", primary="SHAFT_RIGHT", friction=0.2, clearance=-0.02)
+        model.add_temperature(320.0, "HUB", reference=20.0, ramp=[(0, 1), (1, 1), (2, 0)])
+        last = fc.solve(model, [1.0, 2.0], criteria=fc.Criteria(friction_while_touching=limit))[-1]
+        forces.append(last.contact["fit"].normal_force)
+        iterations.append(sum(entry["active_set_iterations"] for entry in last.iterations["history"]))
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-5)
+    assert iterations[0] < 200
+    assert iterations[1] < 400
+    assert iterations[2] < 30

@@ -119,12 +119,12 @@ class Linearised(Protocol):
     Attributes
     ----------
     law : Law
-    round_off : float
-        Bound of the round-off of gaps and slips, in their scaled unit.
     """
 
     law: Law
-    round_off: float
+
+    def round_off(self, y: Array) -> float:
+        """Return a bound of the round-off of the gaps and slips due to forces y (1 + k, m), in their scaled unit."""
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """Return forces and gaps (1 + k, m) that solve the equations of a contact state, linearised at `y` and `gaps`.
@@ -159,15 +159,19 @@ def newton(
     residual = law.residual(y, gaps)
     norm = float(np.linalg.norm(residual))
     best = y, gaps, np.inf
+    earlier: set[int] = set()
     for iteration in range(max_iterations + 1):
         max_force = float(np.abs(y).max())
         max_residual = float(np.abs(residual).max())
-        relative_residual = max_residual / max_force if max_force else float(max_residual > problem.round_off)
+        round_off = problem.round_off(y)
+        relative_residual = max_residual / max_force if max_force else float(max_residual > round_off)
         if relative_residual < best[2]:
             best = y, gaps, relative_residual
-        settled = iteration >= min_iterations and max_residual <= tolerance * max_force + problem.round_off
-        if settled or iteration == max_iterations:
+        settled = iteration >= min_iterations and max_residual <= tolerance * max_force + round_off
+        repeats = (iterate := hash(y.tobytes())) in earlier  # the iteration depends only on the forces, and would cycle
+        if settled or repeats or iteration == max_iterations:
             break
+        earlier.add(iterate)
         full_y, full_gaps = problem.step(y, gaps, *law.state(y, gaps))
         step, change = full_y - y, full_gaps - gaps
         damping = 1.0

@@ -44,6 +44,11 @@ class Delassus:
         product = self.S @ x if self.U is None else self.U @ (self.S @ (self.U.T @ x))
         return np.asarray(product + (self.d * x.T).T)
 
+    def sum_of_magnitudes(self, x: Array) -> Array:
+        """Return the sums (n,) of the magnitudes of all terms of the product with x (n,), which bound its round-off."""
+        U = None if self.U is None else abs(self.U)
+        return Delassus(np.abs(self.d), np.abs(self.S), U) @ np.abs(x)
+
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of F."""
         added = self.S.diagonal() if self.U is None else self.U.multiply(self.U @ self.S).sum(axis=1)

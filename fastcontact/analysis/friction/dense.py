@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.linalg.blas import dger
 from scipy.sparse import csr_array, eye_array
 
 from fastcontact._tools.records import record, replace
@@ -88,7 +89,7 @@ def solve(
         regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F.d)))
         F = replace(F, d=F.d + scattered(np.full(len(regularised), compliance), regularised, F.d.shape))
         scaled_free = free * force_units / scale
-        problem = _Problem(F, scaled_free, law, components, SUM_ROUND_OFF * largest(scaled_free))
+        problem = _Problem(F, scaled_free, law, components)
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: with the forces of an earlier geometry update, the residual may be below the round-off
             # bound, which is common to all constraints, although gaps of constraints with a large compliance are still open.
@@ -121,11 +122,15 @@ class _Problem:
     free: Array
     law: Law
     components: Indices
-    round_off: float
 
     def gaps(self, y: Array) -> Array:
         """Return gaps and slips (1 + k, m) for forces y (1 + k, m)."""
         return self.free + scattered(self.F @ y.ravel()[self.components], self.components, self.free.shape)
+
+    def round_off(self, y: Array) -> float:
+        """See `cone_newton.Linearised`. It is large if soft springs hold a body: slips are differences of its motions."""
+        rounded = self.F.sum_of_magnitudes(y.ravel()[self.components])
+        return SUM_ROUND_OFF * (largest(self.free) + largest(rounded))
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised`."""
@@ -140,18 +145,30 @@ class _Problem:
 
         The same initial forces are tried with and without a line search: at a kink of the residual, Newton's method may
         converge with full steps although no shortened step decreases the residual.
+
+        If soft springs resist the sliding of a body, a small error of its forces reverses the slips of all constraints, so
+        that Newton's method cycles and shortened steps do not help. In 2D the polyhedral cone is exact, and precedes.
         """
         guess = None if guess is None or not guess.any() else guess
+        slip_compliance = largest(self.F.diagonal()[self.components >= self.free.shape[1]])
+        on_soft_springs = len(self.free) == 2 and slip_compliance * NOTABLE > 1.0
         if guess is not None:
-            yield guess, True
+            yield guess, not on_soft_springs
+        if on_soft_springs:
+            yield from self._polyhedral_starts()
         equality = self.law.equality
         sticking = closed & ~equality if (closed & ~equality).any() else (self.free[0] < 0) & ~equality
         sticking_forces = self.step(np.zeros_like(self.free), self.free, sticking | equality, sticking)[0]
         yield sticking_forces, True
         yield self._by_continuation(sticking_forces), True
         if guess is not None:
-            yield guess, False
+            yield guess, on_soft_springs
         yield sticking_forces, False
+        if not on_soft_springs:
+            yield from self._polyhedral_starts()
+
+    def _polyhedral_starts(self) -> Iterator[tuple[Array, bool]]:
+        """Yield the `starts` from polyhedral cones."""
         for edges in EDGES if len(self.free) == 3 else (2,):
             edge_forces = _polyhedral_forces(self, edges)
             if edge_forces is not None:
@@ -316,7 +333,7 @@ def lemke(M: Array, q: Array, max_pivots: int) -> tuple[Array | None, int]:
         return z, 0
     # Rows: basic variables as affine functions of the nonbasic ones. The variable w_i has the number i, z_i the number n + i,
     # and the artificial variable the number 2 n.
-    table = np.column_stack([M, np.ones(n), q])
+    table = np.asfortranarray(np.column_stack([M, np.ones(n), q]))
     basic, nonbasic = np.arange(n), np.arange(n, 2 * n + 1)
     row, column = int(q.argmin()), n
     for count in range(1, max_pivots + 1):
@@ -336,12 +353,15 @@ def lemke(M: Array, q: Array, max_pivots: int) -> tuple[Array | None, int]:
 
 
 def _exchange(table: Array, row: int, column: int) -> None:
-    """Pivot in place: exchange the basic variable of `row` with the nonbasic variable of `column`."""
+    """Pivot in place: exchange the basic variable of `row` with the nonbasic variable of `column`.
+
+    `table` is in Fortran order, in which BLAS updates it without a copy.
+    """
     pivot, factors = table[row, column], table[:, column].copy()
     table[:, column], factors[row] = 0.0, 0.0
     table[row] /= -pivot
     table[row, column] = 1.0 / pivot
-    table += factors[:, None] * table[row]
+    dger(1.0, factors, table[row].copy(), a=table, overwrite_a=True)
 
 
 def _blocking(table: Array, basic: Indices, column: int) -> int | None:

@@ -141,7 +141,11 @@ class Eliminated:
         self._unit = np.sqrt(1.0 / (np.where(normal > 0.0, normal, 1.0) / estimate + self._compliance[0]))
         self.law = cone_newton.Law(np.where(usable, mu, 0.0), constraints.equality & usable)
         self.u = u
-        self.round_off = SUM_ROUND_OFF * largest((self._unit * self._gaps(u))[:, usable])
+        self._round_off = SUM_ROUND_OFF * largest((self._unit * self._gaps(u))[:, usable])
+
+    def round_off(self, y: Array) -> float:
+        """See `cone_newton.Linearised`."""
+        return self._round_off
 
     def _compliance_of_rows(self, rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
         """Return the sum of `compliance_of_rows` and the tangential compliance of the constraints themselves.
