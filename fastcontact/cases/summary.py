@@ -10,7 +10,7 @@ import numpy as np
 from fastcontact._tools.versions import versions
 from fastcontact.analysis.resultants import contact_resultants
 from fastcontact.cases.case import Case, Label
-from fastcontact.cases.checks import contact_at_point, outcome
+from fastcontact.cases.checks import contact_at_point, default_target, outcome
 from fastcontact.errors import ModelError
 from fastcontact.model.rigid_motions import grouped_by_body
 from fastcontact.results.step import ContactResult, StepResult, force_text
@@ -186,7 +186,8 @@ def _theory_deviations(
 
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
     """Return the quantities of a theory, and the relative deviations [-] of the computed ones; None if they are undefined."""
-    exact = {name: finite_or_none(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip is unbounded
+    targets = {name: getattr(theory, default_target(name, theory)) for name in COMPARED}
+    exact = {name: finite_or_none(value) for name, value in targets.items()}  # the pressure under a tip is unbounded
     deviation = {name: finite_or_none(computed[name] / value - 1.0) if value else None for name, value in exact.items()}
     return {**exact, "deviation": deviation}
 

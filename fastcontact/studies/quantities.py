@@ -295,6 +295,8 @@ def theory_quantities(theory: Any, share: float = 1.0) -> dict[str, float]:
     quantities = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
     if "force" in quantities:
         quantities["force"] *= share
+    if getattr(theory, "radius_x", None) != getattr(theory, "radius_y", None):
+        del quantities["contact_radius"]  # the fit of `contact_radius` is that of a circle
     curve = pressure_curve(theory)
     if curve is not None:
         quantities |= {"pressure_max": curve.pressure_max, "pressure_pole": float(curve.pressure(0.0))}

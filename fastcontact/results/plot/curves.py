@@ -360,7 +360,8 @@ def history(
     pair : str
         Name of a contact pair.
     law : object with the method ``at_approach(d)``, optional
-        A theory, such as `analytic.hertz_point`; it is only plotted if `approach` is given.
+        A theory, such as `analytic.hertz_point`; it is only plotted if `approach` is given. Both semi-axes of an ellipse
+        are plotted.
     approach : float, optional
         Approach of the bodies at load factor 1 [length]; if it is given, the abscissa is the approach.
     share : float
@@ -408,7 +409,9 @@ def history(
         approaches = x.max() * np.linspace(0.0, 1.0, 200)[1:] ** 2
         theory = [law.at_approach(d) for d in approaches]
         upper.plot([0.0, *approaches], [0.0, *(share * t.force for t in theory)], "k-", lw=1, label=name)
-        lower.plot([0.0, *approaches], [0.0, *(t.radius for t in theory)], "k-", lw=1, label=name)
+        for radius in ("radius_x", "radius_y") if hasattr(law, "radius_x") else ("radius",):
+            label = None if radius == "radius_y" else name
+            lower.plot([0.0, *approaches], [0.0, *(getattr(t, radius) for t in theory)], "k-", lw=1, label=label)
     if any(c.per_thickness for c in contacts):
         units = units_of_results(units, "plane_strain")
     upper.set(ylabel=axis_label("sum of the normal forces" if cancels else "contact force", units, "force"))

@@ -12,12 +12,17 @@ import fastcontact as fc
 from fastcontact.cases.case import build_case, stored_description
 from fastcontact.cases.checks import Check, outcome, quantity_value, read_check
 from fastcontact.cases.summary import lines, step_entry, summarise
+from fastcontact.studies.quantities import theory_quantities
 
 HERTZ = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.0)
 SLIP = fc.analytic.cattaneo_mindlin_line(
     E1=1e3, nu1=0.3, R1=9.0, E2=1e3, nu2=0.3, R2=9.0, force=2.0, friction=0.5, tangential_force=0.5
 )
-THEORIES = {"hertz": {"theory": HERTZ, "share": 0.25}, "slip": {"theory": SLIP, "share": 1.0}}
+ELLIPSE = fc.analytic.hertz_elliptical(E1=1000.0, nu1=0.3, R1x=1.0, R1y=20.0, force=4.0)
+THEORIES = {
+    "hertz": {"theory": HERTZ, "share": 0.25},
+    **{name: {"theory": theory, "share": 1.0} for name, theory in (("slip", SLIP), ("ellipse", ELLIPSE))},
+}
 PROBES = {"pole": 0, "far": 3}
 PAIRS = {"hertz": {}, "slip": {}}
 
@@ -65,6 +70,10 @@ def test_targets_come_from_the_theory_or_are_documented():
     assert check(quantity="pole.pressure", theory="hertz").target(HERTZ) == HERTZ.pressure_max
     assert check(quantity="pole.stress.yy", theory="hertz").target(HERTZ) == -HERTZ.pressure_max
     assert check(quantity="hertz.radius", theory="hertz").target(HERTZ) == HERTZ.radius
+    mean = 0.5 * (ELLIPSE.radius_x + ELLIPSE.radius_y)  # the bounds in 3D are the semi-axes
+    assert check(quantity="hertz.radius", theory="ellipse").target(ELLIPSE) == mean > 1.1 * ELLIPSE.radius
+    assert "contact_radius" in theory_quantities(HERTZ)
+    assert "contact_radius" not in theory_quantities(ELLIPSE)
     assert check(quantity="hertz.stick_radius", theory="slip").target(SLIP) == SLIP.stick_radius
     assert (
         check(quantity="pole.shear", theory="slip", of="normal.pressure_max").target(SLIP) == SLIP.normal.pressure_max
