@@ -240,7 +240,12 @@ def outcome(check: Check, step: StepResult, probes: Mapping[str, int], theories:
     deviation of this solution from the theory.
     """
     theory = theories[check.theory] if check.theory else {}
-    value, target = check.factor * quantity_value(check.quantity, step, probes), check.target(theory.get("theory"))
+    owner, _, field = check.quantity.partition(".")
+    if field == "force" and check.theory:
+        quantity = step.contact[owner].force_against_theory(theory["share"])
+    else:
+        quantity = quantity_value(check.quantity, step, probes)
+    value, target = check.factor * quantity, check.target(theory.get("theory"))
     solution = theory.get("mesh_converged")
     mesh_converged = check.target(solution) if hasattr(solution, check.of) else None
     return {

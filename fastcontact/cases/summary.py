@@ -174,7 +174,7 @@ def _theory_deviations(
 
     `share` is the modelled fraction of the theory's contact.
     """
-    force = float(np.linalg.norm(contact.force)) / share
+    force = contact.force_against_theory(share) / share
     computed = {"force": force, "pressure_max": contact.pressure_max, "radius": 0.5 * sum(contact.radius)}
     deviations = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
     if force > 0 and hasattr(theory, "at_force"):

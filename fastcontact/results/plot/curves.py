@@ -401,7 +401,7 @@ def history(
     contacts, units = contacts_of(steps, pair), units_of(units, steps[-1])
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
     cancels = any(c.active.any() for c in contacts) and all(c.cancels for c in contacts if c.active.any())
-    forces = [c.normal_force if cancels else float(np.linalg.norm(c.force)) for c in contacts]
+    forces = [c.normal_force if cancels else c.force_against_theory(share) for c in contacts]
     upper.plot(x, forces, "o", ms=4, label="computed")
     _plot_bounds(lower, x, np.array([c.radius for c in contacts]))
     if law is not None and approach is not None:
