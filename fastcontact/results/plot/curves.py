@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.analytic.pressure_curve import PressureCurve, author, pressure_curve
+from fastcontact.analytic.pressure_curve import PressureCurve, author, curves_along_axes
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.elasticity.material_axes import rotated_stress
 from fastcontact.elasticity.recovery import von_mises
@@ -45,7 +45,8 @@ def pressure_profile(
         Result of a contact pair.
     theory : object, optional
         A result of a function in `analytic`, such as `analytic.hertz_point`, or an object with the method ``pressure(r)``
-        and the attributes ``pressure_max`` and ``radius``.
+        and the attributes ``pressure_max`` and ``radius``. `analytic.hertz_elliptical` has a curve along each axis of the
+        ellipse.
     other_theories : mapping of str to object, optional
         Further theories, by their labels in the legend.
     stress : ndarray (m,), optional
@@ -128,10 +129,9 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
     """
     curves = {}
     for legend, candidate in (("", theory), *others.items()):
-        curve = pressure_curve(candidate)
-        if curve is not None:
-            curves[legend or curve.name] = curve
-        elif candidate is not None and not is_dataclass(candidate):
+        found = curves_along_axes(candidate)
+        curves |= {f"{legend or curve.name}{axis}": curve for axis, curve in found.items()}
+        if not found and candidate is not None and not is_dataclass(candidate):
             raise FastcontactError(
                 f"a theory needs a pressure, like the results of fastcontact.analytic, but {candidate!r} has none"
             )
