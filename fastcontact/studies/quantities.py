@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -102,7 +102,7 @@ def _pressure_quantities(contact: ContactResult, share: float = 1.0) -> dict[str
 def _contact_quantities(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:
     """Return the finite quantities of a contact pair, with the errors of the pressure in 2D if there is a theory."""
     theories = case.theories.get(pair, {})
-    theory, share = theories.get("theory"), theories.get("share", 1.0)
+    share, theory = theories.get("share", 1.0), cast(Any, theories.get("theory"))
     quantities = _pressure_quantities(contact, share)
     if case.mesh.dim == 2 and pressure_curve(theory) is not None:
         side = secondary_surface(case, pair)

@@ -127,7 +127,7 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
 
     Results of `analytic` without a pressure are left out.
     """
-    curves = {}
+    curves = dict[str, PressureCurve]()
     for legend, candidate in (("", theory), *others.items()):
         found = curves_along_axes(candidate)
         curves |= {f"{legend or curve.name}{axis}": curve for axis, curve in found.items()}

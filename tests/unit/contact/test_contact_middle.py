@@ -327,7 +327,7 @@ def test_the_theory_of_an_ellipse_is_drawn_along_both_axes():
     np.testing.assert_allclose(major.get_ydata(), hertz.pressure(0.0, r), atol=1e-12)
     np.testing.assert_allclose(minor.get_ydata(), hertz.pressure(minor.get_xdata()), atol=1e-12)
     for line, radius in ((major, hertz.radius_y), (minor, hertz.radius_x)):
-        assert (np.diff(np.sort(np.abs(line.get_xdata() - radius)))[:3] < 0.01 * radius).all()  # fine up to the edge
+        assert radius in line.get_xdata()  # not drawn straight across the edge
     assert [line.get_label().partition(":")[0] for line in (major, minor)] == [
         "theory, major axis",
         "theory, minor axis",
