@@ -1,5 +1,6 @@
 """Checks of case files: admissible comparisons, quantities of contacts, summaries with units."""
 
+import dataclasses
 import tomllib
 
 import numpy as np
@@ -270,13 +271,8 @@ QUARTER = case_of(
 secondary = "CONTACT"
 shape = { kind = "sphere", centre = [0.0, 0.0, 10.0], R = 10.0 }
 force = { z = -50.0 }
-[theory.ball]
-kind = "hertz_point"
-E1 = 1000.0
-nu1 = 0.3
-R1 = 10.0
-force = 200.0
-share = 0.25
+[theory]
+ball = { kind = "hertz_point", E1 = 1000.0, nu1 = 0.3, R1 = 10.0, force = 200.0, share = 0.25 }
 [[check]]
 quantity = "ball.force"
 theory = "ball"
@@ -297,6 +293,9 @@ def test_the_force_of_a_quarter_excludes_the_part_that_symmetry_balances(tmp_pat
     told = summarise(case, last, [], {}, [])
     assert told["checks"][0]["value"] == pytest.approx(200.0, rel=1e-9)
     assert told["theory"]["ball"]["equal_force"]["force"] == pytest.approx(200.0, rel=1e-9)
+    ellipse = dataclasses.replace(case, checks=[], theories={"ball": {"theory": ELLIPSE, "share": 0.25}})
+    compared = summarise(ellipse, last, [], {}, [])["theory"]["ball"]["equal_approach"]
+    assert compared["radius"] == 0.5 * (ELLIPSE.radius_x + ELLIPSE.radius_y)
     assert measure(case, last, "ball")["force"] == pytest.approx(50.0, rel=1e-9)
     upper = fc.plot.history([last], "ball", share=0.25)[0]
     assert upper.lines[0].get_ydata() == pytest.approx([50.0], rel=1e-9)
