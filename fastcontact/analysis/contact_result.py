@@ -129,6 +129,7 @@ def contact_result(
         middle=middle.position,
         place=place,
         tangent=tangent,
+        direction=middle.direction if coordinates.shape[1] == 3 else None,
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
         fluid_pressure=dry if constraints.wetted is None else constraints.wetted.pressure,

@@ -52,6 +52,11 @@ class HertzElliptical:
         """Radius sqrt(radius_x radius_y) [length] of the circle whose area is equal to the contact area."""
         return math.sqrt(self.radius_x * self.radius_y)
 
+    @property
+    def radius_mean(self) -> float:
+        """Mean of the two semi-axes [length], to which the mean of the bounds of `ContactResult.radius` tends."""
+        return 0.5 * (self.radius_x + self.radius_y)
+
     def at_force(self, force: float) -> HertzElliptical:
         """Return the same contact under another force [force]."""
         return _solve(self.bodies, self.R_x, self.R_y, *exactly_one(force=force))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -85,3 +86,30 @@ def pressure_curve(theory: Any) -> PressureCurve | None:
     if not (callable(theory.pressure) and math.isfinite(theory.pressure_max)):
         return None
     return PressureCurve(name, theory.pressure, float(theory.pressure_max), float(theory.radius))
+
+
+def has_ellipse(theory: Any) -> bool:
+    """Return whether a theory is that of an elliptical contact with different semi-axes."""
+    return isinstance(theory, analytic.HertzElliptical) and theory.radius_x != theory.radius_y
+
+
+def curves_along_axes(theory: Any) -> dict[str, PressureCurve]:
+    """Return the curves of a theory by the suffixes of their labels: of an ellipse, those along the major and minor axis.
+
+    Examples
+    --------
+    >>> from fastcontact.analytic import hertz_elliptical
+    >>> hertz = hertz_elliptical(E1=1000.0, nu1=0.3, R1x=10.0, R1y=20.0, force=1.0)
+    >>> curves = curves_along_axes(hertz)
+    >>> list(curves)
+    [', major axis', ', minor axis']
+    >>> curves[", major axis"].radius == hertz.radius_y > hertz.radius_x
+    True
+    """
+    curve = pressure_curve(theory)
+    if curve is None or not has_ellipse(theory):
+        return {} if curve is None else {"": curve}
+    along_x = replace(curve, radius=theory.radius_x)
+    along_y = replace(curve, radius=theory.radius_y, pressure=partial(theory.pressure, 0.0))
+    ordered = (along_x, along_y) if theory.radius_x > theory.radius_y else (along_y, along_x)
+    return dict(zip((", major axis", ", minor axis"), ordered, strict=True))

@@ -168,10 +168,11 @@ def read_check(
     if owner in pairs and field in REQUIRED_OPTIONS and REQUIRED_OPTIONS[field][0] not in pairs[owner]:
         raise CaseError(f"{where}: '{owner}' has no {field}: {REQUIRED_OPTIONS[field][1]}")
     base = field.split(".")[0]
-    share = theories.get(entry.get("theory", ""), {}).get("share", 1.0) if base == "force" else 1.0
+    theory = theories.get(entry.get("theory", ""), {})
+    share = theory.get("share", 1.0) if base == "force" else 1.0
     defaults = {
         "name": entry["quantity"],
-        "of": base if owner in pairs else "pressure_max",
+        "of": default_target(base, theory.get("theory")) if owner in pairs else "pressure_max",
         "factor": 1.0 / float(share),
     }
     numbers = {key: float(entry[key]) for key in ("tolerance", "value", "factor") if key in entry}
@@ -190,6 +191,14 @@ def read_check(
         check_known(f"theory in {where}", check.theory, theories, CaseError)
         check_target(where, check, theories[check.theory]["theory"])
     return check
+
+
+def default_target(quantity: str, theory: Any) -> str:
+    """Return the name of the number of a theory that corresponds to a quantity of a pair, usually its own name.
+
+    The mean of the bounds of a contact radius tends to the mean of the semi-axes if the contact is an ellipse.
+    """
+    return "radius_mean" if quantity == "radius" and hasattr(theory, "radius_mean") else quantity
 
 
 def defined_names(names: Collection[str], kinematics: str) -> list[str]:
@@ -231,7 +240,12 @@ def outcome(check: Check, step: StepResult, probes: Mapping[str, int], theories:
     deviation of this solution from the theory.
     """
     theory = theories[check.theory] if check.theory else {}
-    value, target = check.factor * quantity_value(check.quantity, step, probes), check.target(theory.get("theory"))
+    owner, _, field = check.quantity.partition(".")
+    if field == "force" and check.theory:
+        quantity = step.contact[owner].force_against_theory(theory["share"])
+    else:
+        quantity = quantity_value(check.quantity, step, probes)
+    value, target = check.factor * quantity, check.target(theory.get("theory"))
     solution = theory.get("mesh_converged")
     mesh_converged = check.target(solution) if hasattr(solution, check.of) else None
     return {

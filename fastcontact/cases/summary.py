@@ -10,7 +10,7 @@ import numpy as np
 from fastcontact._tools.versions import versions
 from fastcontact.analysis.resultants import contact_resultants
 from fastcontact.cases.case import Case, Label
-from fastcontact.cases.checks import contact_at_point, outcome
+from fastcontact.cases.checks import contact_at_point, default_target, outcome
 from fastcontact.errors import ModelError
 from fastcontact.model.rigid_motions import grouped_by_body
 from fastcontact.results.step import ContactResult, StepResult, force_text
@@ -174,7 +174,7 @@ def _theory_deviations(
 
     `share` is the modelled fraction of the theory's contact.
     """
-    force = float(np.linalg.norm(contact.force)) / share
+    force = contact.force_against_theory(share) / share
     computed = {"force": force, "pressure_max": contact.pressure_max, "radius": 0.5 * sum(contact.radius)}
     deviations = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
     if force > 0 and hasattr(theory, "at_force"):
@@ -186,7 +186,8 @@ def _theory_deviations(
 
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
     """Return the quantities of a theory, and the relative deviations [-] of the computed ones; None if they are undefined."""
-    exact = {name: finite_or_none(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip is unbounded
+    targets = {name: getattr(theory, default_target(name, theory)) for name in COMPARED}
+    exact = {name: finite_or_none(value) for name, value in targets.items()}  # the pressure under a tip is unbounded
     deviation = {name: finite_or_none(computed[name] / value - 1.0) if value else None for name, value in exact.items()}
     return {**exact, "deviation": deviation}
 

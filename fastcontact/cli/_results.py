@@ -107,7 +107,7 @@ def theories_at_equal_load(
     `share` [-] is the fraction of the contact that the model represents. The `approach` [length] is reached at load
     multiplier 1, and `load` [-] is the multiplier of the step.
     """
-    curves, force = {}, float(np.linalg.norm(contact.force)) / share
+    curves, force = {}, contact.force_against_theory(share) / share
     if approach is not None and load == 1.0:
         curves[f"{name}, equal approach"] = theory
     elif approach is not None and load > 0 and hasattr(theory, "at_approach"):

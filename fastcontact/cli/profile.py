@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
+from fastcontact.analytic.pressure_curve import PressureCurve, curves_along_axes, has_ellipse, pressure_curve
+from fastcontact.arrays import Array
 from fastcontact.cli import _results
 from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
 from fastcontact.cli._results import load_multiplier, pressure_curves
@@ -36,14 +37,20 @@ def run(options: Namespace) -> int:
     table = contact_table(contact, step)
     load = load_multiplier(case["ramp"], step)
     theories = pressure_curves(case["theories"].get(name, {}), contact, approach=case["approach"].get(name), load=load)
-    curves = {label: curve for label, theory in theories.items() if (curve := pressure_curve(theory))}
-    for label, curve in curves.items():
+    for label, theory in theories.items():
+        pressure = _pressure_at_nodes(theory, contact, case["theories"][name]["share"], table["radius"])
         column = f"pressure_{label.replace(', ', '_').replace(' ', '_').replace('é', 'e')}"
-        table = with_column(table, column, curve.pressure(table["radius"]))
+        if pressure is not None:
+            table = with_column(table, column, pressure)
+        elif not options.quiet:
+            text = "the principal axes of the contact are unknown, or its 'share' does not match the model"
+            say(f"contact '{name}': no column '{column}' of the elliptical theory: {text}", error=True)
     if options.csv:
         write_csv(options.csv, table)
     if options.agr:
-        _write_agr(options.agr, case, contact, step, curves)
+        curves = [(k, curves_along_axes(theory)) for k, theory in theories.items()]
+        by_label = {f"{label}{axis}": curve for label, along in curves for axis, curve in along.items()}
+        _write_agr(options.agr, case, contact, step, by_label)
     if options.png:
         draw_profile(contact, step, theories, options.png, case["title"] or name)
     if options.csv or options.agr or options.png:
@@ -51,6 +58,24 @@ def run(options: Namespace) -> int:
     else:
         _print_table(table)
     return 0
+
+
+def _pressure_at_nodes(theory: Any, contact: Any, share: float, distance: Array) -> Array | None:
+    """Return the pressure of a theory at the secondary nodes (m,) [pressure]; None if the axes of its ellipse are unknown.
+
+    `distance` (m,) are the distances of the rows of the table from the middle of the contact [length].
+    """
+    from fastcontact.results.contact_ellipse import principal_coordinates
+
+    if not has_ellipse(theory):
+        curve = pressure_curve(theory)
+        return None if curve is None else curve.pressure(distance)
+    position = principal_coordinates(contact, share)
+    if position is None:
+        return None
+    major, minor = position.T  # in the order of the rows, because the table of a contact in 3D is not sorted
+    x, y = (major, minor) if theory.radius_x > theory.radius_y else (minor, major)
+    return np.asarray(theory.pressure(x, y))
 
 
 def _print_table(table: Any) -> None:

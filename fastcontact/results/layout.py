@@ -165,7 +165,7 @@ def contact_step_row(dim: int) -> np.dtype[Any]:
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN for contact between bodies
     sums += [("obstacle_angle", "<f8"), ("torque", "<f8")]  # NaN without a rotation
     sums += [("middle", "<f8", (dim,)), ("tangent", "<f8", (dim,))]  # NaN without a tangent
-    sums.append(("stick_bounds", "<f8", (2,)))  # NaN in 2D
+    sums += [("stick_bounds", "<f8", (2,)), ("direction", "<f8", (dim,))]  # NaN in 2D
     return np.dtype([*((name, "<i8") for name in ROW_COLUMNS), *sums])
 
 

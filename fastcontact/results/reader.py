@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     import pandas
 
 # In these columns of the table of steps of a contact pair, NaN stands for None.
-NAN_FOR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent", "stick_bounds")
+NAN_FOR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent", "direction", "stick_bounds")
 
 
 @typed(FileError)

@@ -211,6 +211,9 @@ class ContactResult(NameSuggestions):
     tangent : ndarray (dim,), optional
         Direction along which half-widths are measured in 2D [-]. It is None in axisymmetry, in 3D, and on a ring in contact
         along its entire circumference or across the ends of a period, where `place` is used instead.
+    direction : ndarray (dim,), optional
+        Mean normal of the contact in 3D, without its components normal to the planes of symmetry that the contact reaches
+        [-]. It is None in 2D, without a mean normal, and in files of earlier versions.
     wear : ndarray (m,), optional
         Accumulated wear depth at the end of the step, with the option ``wear`` [length].
     heat_flux : ndarray (m,), optional
@@ -271,6 +274,7 @@ class ContactResult(NameSuggestions):
     middle: Array = None  # type: ignore[assignment]
     place: Array = None  # type: ignore[assignment]
     tangent: Array | None = None
+    direction: Array | None = None
     primary_points: Numbers = None  # type: ignore[assignment]
     primary_force_vectors: Array = None  # type: ignore[assignment]
     obstacle_angle: float | None = None
@@ -405,6 +409,26 @@ class ContactResult(NameSuggestions):
         along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
         total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)
         return float(total), float(normal_part), float(tangential)
+
+    def force_against_theory(self, share: float) -> float:
+        """Return the force that is compared with a theory, of whose contact the model contains the fraction `share` [-].
+
+        Pressures on the inclined facets of a quarter or a half have a resultant along the surface, which the other parts of
+        the contact balance. For a `share` below 1, the force is therefore the component of `force` along `direction`.
+
+        Parameters
+        ----------
+        share : float
+            Fraction of the contact of the theory that the model contains, for example 0.25 for a quarter [-].
+
+        Returns
+        -------
+        float
+            Magnitude of `force` or of its component, not divided by `share` [force].
+        """
+        if share == 1.0 or self.direction is None:
+            return float(np.linalg.norm(self.force))
+        return abs(float(self.force @ self.direction))
 
     @property
     def cancels(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -86,10 +86,10 @@ def quantities_of_contacts(last: StepResult) -> dict[str, float]:
     return {} if contact is None else _pressure_quantities(contact)
 
 
-def _pressure_quantities(contact: ContactResult) -> dict[str, float]:
-    """Return the quantities of a contact pair that do not depend on the case."""
+def _pressure_quantities(contact: ContactResult, share: float = 1.0) -> dict[str, float]:
+    """Return the quantities of a contact pair that depend only on the case's fraction `share` of the contact [-]."""
     quantities = {
-        "force": contact.normal_force if contact.cancels else float(np.linalg.norm(contact.force)),
+        "force": contact.normal_force if contact.cancels else contact.force_against_theory(share),
         "pressure_max": contact.pressure_max,
         "contact_radius": contact_radius(contact),
     }
@@ -101,13 +101,14 @@ def _pressure_quantities(contact: ContactResult) -> dict[str, float]:
 
 def _contact_quantities(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:
     """Return the finite quantities of a contact pair, with the errors of the pressure in 2D if there is a theory."""
-    quantities = _pressure_quantities(contact)
-    theory: Any = case.theories.get(pair, {}).get("theory")
+    theories = case.theories.get(pair, {})
+    share, theory = theories.get("share", 1.0), cast(Any, theories.get("theory"))
+    quantities = _pressure_quantities(contact, share)
     if case.mesh.dim == 2 and pressure_curve(theory) is not None:
         side = secondary_surface(case, pair)
         quantities["pressure_error"] = pressure_error(case, side, contact, theory)
         if hasattr(theory, "at_force") and quantities["force"] > 0:
-            at_force = theory.at_force(quantities["force"] / case.theories[pair]["share"])
+            at_force = theory.at_force(quantities["force"] / share)
             quantities["pressure_error_equal_force"] = pressure_error(case, side, contact, at_force)
     return {name: value for name, value in quantities.items() if np.isfinite(value)}
 
@@ -295,6 +296,8 @@ def theory_quantities(theory: Any, share: float = 1.0) -> dict[str, float]:
     quantities = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
     if "force" in quantities:
         quantities["force"] *= share
+    if getattr(theory, "radius_x", None) != getattr(theory, "radius_y", None):
+        del quantities["contact_radius"]  # the fit of `contact_radius` is that of a circle
     curve = pressure_curve(theory)
     if curve is not None:
         quantities |= {"pressure_max": curve.pressure_max, "pressure_pole": float(curve.pressure(0.0))}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.analytic.pressure_curve import PressureCurve, author, pressure_curve
+from fastcontact.analytic.pressure_curve import PressureCurve, author, curves_along_axes
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.elasticity.material_axes import rotated_stress
 from fastcontact.elasticity.recovery import von_mises
@@ -45,7 +45,8 @@ def pressure_profile(
         Result of a contact pair.
     theory : object, optional
         A result of a function in `analytic`, such as `analytic.hertz_point`, or an object with the method ``pressure(r)``
-        and the attributes ``pressure_max`` and ``radius``.
+        and the attributes ``pressure_max`` and ``radius``. `analytic.hertz_elliptical` has a curve along each axis of the
+        ellipse.
     other_theories : mapping of str to object, optional
         Further theories, by their labels in the legend.
     stress : ndarray (m,), optional
@@ -126,12 +127,11 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
 
     Results of `analytic` without a pressure are left out.
     """
-    curves = {}
+    curves = dict[str, PressureCurve]()
     for legend, candidate in (("", theory), *others.items()):
-        curve = pressure_curve(candidate)
-        if curve is not None:
-            curves[legend or curve.name] = curve
-        elif candidate is not None and not is_dataclass(candidate):
+        found = curves_along_axes(candidate)
+        curves |= {f"{legend or curve.name}{axis}": curve for axis, curve in found.items()}
+        if not found and candidate is not None and not is_dataclass(candidate):
             raise FastcontactError(
                 f"a theory needs a pressure, like the results of fastcontact.analytic, but {candidate!r} has none"
             )
@@ -360,7 +360,8 @@ def history(
     pair : str
         Name of a contact pair.
     law : object with the method ``at_approach(d)``, optional
-        A theory, such as the result of `analytic.hertz_point`; it is only plotted if `approach` is given.
+        A theory, such as the result of `analytic.hertz_point`; it is only plotted if `approach` is given. Both semi-axes of
+        an ellipse are plotted.
     approach : float, optional
         Approach of the bodies at load factor 1 [length]; if it is given, the abscissa is the approach, which is assumed to
         be proportional to the load factor.
@@ -401,7 +402,7 @@ def history(
     contacts, units = contacts_of(steps, pair), units_of(units, steps[-1])
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
     cancels = any(c.active.any() for c in contacts) and all(c.cancels for c in contacts if c.active.any())
-    forces = [c.normal_force if cancels else float(np.linalg.norm(c.force)) for c in contacts]
+    forces = [c.normal_force if cancels else c.force_against_theory(share) for c in contacts]
     upper.plot(x, forces, "o", ms=4, label="computed")
     _plot_bounds(lower, x, np.array([c.radius for c in contacts]))
     if law is not None and approach is not None:
@@ -409,7 +410,9 @@ def history(
         approaches = x.max() * np.linspace(0.0, 1.0, 200)[1:] ** 2
         theory = [law.at_approach(d) for d in approaches]
         upper.plot([0.0, *approaches], [0.0, *(share * t.force for t in theory)], "k-", lw=1, label=name)
-        lower.plot([0.0, *approaches], [0.0, *(t.radius for t in theory)], "k-", lw=1, label=name)
+        for radius in ("radius_x", "radius_y") if hasattr(law, "radius_x") else ("radius",):
+            label = None if radius == "radius_y" else name
+            lower.plot([0.0, *approaches], [0.0, *(getattr(t, radius) for t in theory)], "k-", lw=1, label=label)
     if any(c.per_thickness for c in contacts):
         units = units_of_results(units, "plane_strain")
     upper.set(ylabel=axis_label("sum of the normal forces" if cancels else "contact force", units, "force"))

@@ -1,5 +1,6 @@
 """Checks of case files: admissible comparisons, quantities of contacts, summaries with units."""
 
+import dataclasses
 import tomllib
 
 import numpy as np
@@ -12,12 +13,18 @@ import fastcontact as fc
 from fastcontact.cases.case import build_case, stored_description
 from fastcontact.cases.checks import Check, outcome, quantity_value, read_check
 from fastcontact.cases.summary import lines, step_entry, summarise
+from fastcontact.cli._results import pressure_curves
+from fastcontact.studies.quantities import measure, theory_quantities
 
 HERTZ = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.0)
 SLIP = fc.analytic.cattaneo_mindlin_line(
     E1=1e3, nu1=0.3, R1=9.0, E2=1e3, nu2=0.3, R2=9.0, force=2.0, friction=0.5, tangential_force=0.5
 )
-THEORIES = {"hertz": {"theory": HERTZ, "share": 0.25}, "slip": {"theory": SLIP, "share": 1.0}}
+ELLIPSE = fc.analytic.hertz_elliptical(E1=1000.0, nu1=0.3, R1x=1.0, R1y=20.0, force=4.0)
+THEORIES = {
+    "hertz": {"theory": HERTZ, "share": 0.25},
+    **{name: {"theory": theory, "share": 1.0} for name, theory in (("slip", SLIP), ("ellipse", ELLIPSE))},
+}
 PROBES = {"pole": 0, "far": 3}
 PAIRS = {"hertz": {}, "slip": {}}
 
@@ -65,6 +72,10 @@ def test_targets_come_from_the_theory_or_are_documented():
     assert check(quantity="pole.pressure", theory="hertz").target(HERTZ) == HERTZ.pressure_max
     assert check(quantity="pole.stress.yy", theory="hertz").target(HERTZ) == -HERTZ.pressure_max
     assert check(quantity="hertz.radius", theory="hertz").target(HERTZ) == HERTZ.radius
+    mean = 0.5 * (ELLIPSE.radius_x + ELLIPSE.radius_y)  # the bounds in 3D are the semi-axes
+    assert check(quantity="hertz.radius", theory="ellipse").target(ELLIPSE) == mean > 1.1 * ELLIPSE.radius
+    assert "contact_radius" in theory_quantities(HERTZ)
+    assert "contact_radius" not in theory_quantities(ELLIPSE)
     assert check(quantity="hertz.stick_radius", theory="slip").target(SLIP) == SLIP.stick_radius
     assert (
         check(quantity="pole.shear", theory="slip", of="normal.pressure_max").target(SLIP) == SLIP.normal.pressure_max
@@ -251,3 +262,44 @@ def test_units_are_named_where_they_are_known_and_nothing_where_not(steps):
     assert [line.split()[0] for line in known] == [line.split()[0] for line in unknown]
     dashes = UNITS.replace('"mm"', '"-"').replace('"N"', '"-"').replace('"MPa"', '"-"')
     assert lines(summary(DRUM + dashes + asked, steps)) == unknown
+
+
+# A quarter of a block under a rigid sphere; the force on the whole is 200.
+QUARTER = case_of(
+    'generator = "graded-block"\nelement = "hex8"\nwidth = 8.0\ncontact_radius = 1.3\ncontact_size = 0.4\ngrowth = 1.0',
+    """[obstacle.ball]
+secondary = "CONTACT"
+shape = { kind = "sphere", centre = [0.0, 0.0, 10.0], R = 10.0 }
+force = { z = -50.0 }
+[theory]
+ball = { kind = "hertz_point", E1 = 1000.0, nu1 = 0.3, R1 = 10.0, force = 200.0, share = 0.25 }
+[[check]]
+quantity = "ball.force"
+theory = "ball"
+tolerance = 1e-9
+""", "3d", BOTTOM="z", SYMMETRY_X="x", SYMMETRY_Y="y",
+)  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_the_force_of_a_quarter_excludes_the_part_that_symmetry_balances(tmp_path):
+    case = build_case(tomllib.loads(QUARTER), name="ball")
+    with fc.ResultWriter(tmp_path / "a.vtkhdf", case.model) as out:
+        last = fc.solve(case.model, case.ramp, on_step=out.write)[-1]
+    contact = last.contact["ball"]
+    np.testing.assert_allclose(contact.direction, [0.0, 0.0, -1.0], atol=1e-12)
+    assert np.linalg.norm(contact.force) > 50.05  # the balanced part of a quarter
+    assert contact.force_against_theory(1.0) == np.linalg.norm(contact.force)
+    told = summarise(case, last, [], {}, [])
+    assert told["checks"][0]["value"] == pytest.approx(200.0, rel=1e-9)
+    assert told["theory"]["ball"]["equal_force"]["force"] == pytest.approx(200.0, rel=1e-9)
+    ellipse = dataclasses.replace(case, checks=[], theories={"ball": {"theory": ELLIPSE, "share": 0.25}})
+    compared = summarise(ellipse, last, [], {}, [])["theory"]["ball"]["equal_approach"]
+    assert compared["radius"] == 0.5 * (ELLIPSE.radius_x + ELLIPSE.radius_y)
+    assert measure(case, last, "ball")["force"] == pytest.approx(50.0, rel=1e-9)
+    upper = fc.plot.history([last], "ball", share=0.25)[0]
+    assert upper.lines[0].get_ydata() == pytest.approx([50.0], rel=1e-9)
+    with fc.open_results(tmp_path / "a.vtkhdf") as results:
+        stored = results[0].contact["ball"]
+    (hertz,) = pressure_curves(case.theories["ball"], stored).values()
+    assert hertz.force == pytest.approx(200.0, rel=1e-9)

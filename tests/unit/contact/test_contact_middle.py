@@ -1,9 +1,11 @@
 """Distances from the middle of a contact, at any position and orientation; their pictures."""
 
 import csv
+import dataclasses
 
 import numpy as np
 import pytest
+from matplotlib_pictures import contact_of, step_of
 from models import elastic_model, supported, united
 
 import fastcontact as fc
@@ -262,6 +264,65 @@ def test_the_command_writes_places_from_the_middle(tmp_path):
     np.testing.assert_allclose([float(row["place"]) for row in rows], contact.place)
     assert "middle of the contact" in files["agr"].read_text()
     assert files["png"].read_bytes()[:4] == b"\x89PNG"
+
+
+# Stored with a result: a theory whose larger semi-axis is that along y.
+ELLIPTICAL = """[contact]
+c = {{ secondary = "A", primary = "B" }}
+[theory]
+c = {{ kind = "hertz_elliptical", E1 = 1000.0, nu1 = 0.3, R1x = 2.0, R1y = 20.0, force = 1.0, share = {} }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("share", "sector", "known"),
+    [(1.0, 360.0, True), (0.5, 180.0, True), (0.25, 90.0, True), (0.25, 180.0, False), (1.0, 180.0, False),
+     (0.2, 72.0, False)],
+)  # fmt: skip
+def test_the_theory_at_a_node_is_that_of_its_place_in_the_ellipse(tmp_path, capsys, share, sector, known):
+    """The ellipse has any orientation in space, and its middle is not the origin."""
+    hertz = fc.analytic.hertz_elliptical(E1=1000.0, nu1=0.3, R1x=2.0, R1y=20.0, force=1.0)
+    angle = np.radians(np.arange(0.0, min(sector + 1.0, 359.0), 9.0))
+    radius = np.arange(0.1, 1.5, 0.1)[:, None]
+    x, y = np.cos(angle) * radius, np.sin(angle) * radius
+    x, y = x.ravel() * hertz.radius_y, y.ravel() * hertz.radius_y
+    pressure, weight = hertz.pressure(x, y), np.repeat(radius[:, 0], len(angle))
+    axes = np.linalg.qr(np.array([[1.0, 2.0, -1.0], [0.3, -1.0, 2.0], [2.0, 0.4, 1.0]]))[0]
+    normal = np.tile(axes[2], (len(x), 1))
+    forces = (pressure * weight)[:, None] * normal
+    forces *= hertz.force * share / np.linalg.norm(forces.sum(axis=0))
+    contact = contact_of(
+        np.arange(len(x)), [1.0, 2.0, 3.0] + np.column_stack([x, y]) @ axes[:2], pressure=pressure, normal=normal,
+        active=pressure > 0.0, force_vectors=forces, force=forces.sum(axis=0), middle=np.array([1.0, 2.0, 3.0]),
+        direction=axes[2], place=np.hypot(x, y),
+    )  # fmt: skip
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (20, 10, 3), "hex8")
+    path, table = tmp_path / "e.vtkhdf", tmp_path / "e.csv"
+    with fc.ResultWriter(path, mesh, case_text=ELLIPTICAL.format(share)) as out:
+        out.write(dataclasses.replace(step_of(mesh), contact={"c": contact}))
+    assert main(["profile", str(path), "--csv", str(table)]) == 0
+    column = "pressure_theory_equal_force"
+    rows = list(csv.DictReader(table.open()))
+    assert (column in rows[0]) == known
+    assert ("no column 'pressure_theory_equal_force'" in capsys.readouterr().err) != known
+    if known:
+        computed = [float(row[column]) for row in rows]
+        np.testing.assert_allclose(computed, pressure, atol=1e-6 * hertz.pressure_max)
+
+
+def test_the_theory_of_an_ellipse_is_drawn_along_both_axes():
+    contact, step = pressed(0.0, "up", True)
+    hertz = fc.analytic.hertz_elliptical(E1=E, nu1=0.3, R1x=R, R1y=3 * R, force=7.0)
+    major, minor = fc.plot.pressure_profile(contact, hertz).lines[:2]
+    r = np.asarray(major.get_xdata())
+    np.testing.assert_allclose(major.get_ydata(), hertz.pressure(0.0, r), atol=1e-12)
+    np.testing.assert_allclose(minor.get_ydata(), hertz.pressure(minor.get_xdata()), atol=1e-12)
+    for line, radius in ((major, hertz.radius_y), (minor, hertz.radius_x)):
+        assert radius in line.get_xdata()  # not drawn straight across the edge
+        assert line.get_label().startswith(f"theory, {'major' if line is major else 'minor'} axis:")
+    history = fc.plot.history([step], "c", law=hertz, approach=1.0)[1].lines
+    ends = {float(line.get_ydata()[-1]) for line in history if len(line.get_xdata()) > 2}
+    assert ends == {hertz.at_approach(1.0).radius_x, hertz.at_approach(1.0).radius_y}
 
 
 def test_the_contact_of_an_o_ring_is_measured_along_its_surface():

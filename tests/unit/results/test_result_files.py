@@ -85,6 +85,7 @@ def contact_result(number: int, name: str, formulation: str, mesh: fc.Mesh = MES
         force=vectors(random, dim),
         radius=(float(number), np.nan),
         stick_bounds=(float(number), np.inf),
+        direction=random.normal(size=dim),
         slip=vectors(random, m, dim),
         slip_total=vectors(random, m, dim),
         primary_points=random.permutation(mesh.n_points)[: m // 2].astype(np.int32),
