@@ -33,10 +33,10 @@ def carried(monkeypatch):
     """What is known beside the result: by pair, normal forces of the constraints [force] and nodal areas [area]."""
     found, result = {}, contact_result.contact_result
 
-    def watched(name, pair, part, solution, rows, *more):
-        forces = part.normal_forces(solution.multiplier[rows])
+    def watched(name, pair, part, solution, *more):
+        forces = part.normal_forces(solution.multiplier)
         found[name] = forces, nodal_areas(pair.secondary, pair.points, pair.axisymmetric), pair.points
-        return result(name, pair, part, solution, rows, *more)
+        return result(name, pair, part, solution, *more)
 
     monkeypatch.setattr(contact_result, "contact_result", watched)
     return found
