@@ -84,7 +84,7 @@ class ModelContact(ModelConnections):
               secondary side to lengths (n,).
             - ``clearance_primary``: the same quantity as a function of positions on the primary side.
             - ``clearance_ramp``: history of both clearances, as pairs (load factor, multiplier); by default they are
-            constant.
+              constant.
             - ``friction_ramp``: history of the coefficient of friction, as pairs (load factor, multiplier).
             - ``surface_smoothing``: whether gaps are measured between the smooth surfaces that facets of curved sides
               approximate; True by default, except for node-to-segment contact and at rigid obstacles.
@@ -220,10 +220,10 @@ class ModelContact(ModelConnections):
         """Apply a fluid pressure to both sides of a contact pair, wherever the fluid can penetrate from a source.
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where the contact
-        pressure does not exceed the fluid pressure. There the fluid pressure acts on both sides, along the
-        normals of each side; on the primary side, it acts on the area that faces the wetted part of the secondary side. At
-        finite strain, normals and areas are those of the deformed surfaces. The pressure at each secondary node is the
-        attribute ``fluid_pressure`` of the contact result. To apply the fluid pressure to other surfaces, use `add_pressure`.
+        pressure does not exceed the fluid pressure. There the fluid pressure acts on both sides, along the normals of each
+        side; on the primary side, it acts on the area that faces the wetted part of the secondary side. At finite strain,
+        normals and areas are those of the deformed surfaces. The pressure at each secondary node is the attribute
+        ``fluid_pressure`` of the contact result. To apply the fluid pressure to other surfaces, use `add_pressure`.
 
         Parameters
         ----------
