@@ -542,9 +542,12 @@ class WeightedMortar(Formulation):
         """Return the weighted means (m,) of the cosines between the normals of the primary side and that of a node [-].
 
         Clearance and wear are displacements along the normals of the surface, of which the gap of a node includes the
-        components along its normal. Without these cosines, nodal pressures of a press fit deviate by up to 1 %, see
-        `test_pressures_of_clearances_are_those_of_overlapping_meshes`.
+        components along its normal. Without these cosines, nodal pressures of a press fit in 2D deviate by up to 1 %, see
+        `test_pressures_of_clearances_are_those_of_overlapping_meshes`. In 3D, the result is one: with cosines, the deviations
+        on rings of hex20 cells would be 3 % instead of 1.5 % with dual multipliers, and 2 % instead of 4 % with standard ones.
         """
+        if self.points.shape[1] == 3:
+            return np.ones(len(means.weight))
         if isinstance(self.primary, RigidSide):
             integrals = means.D[:, self.secondary.points] @ means.normal
         elif not isinstance(self.normals, str) or self.normals == "secondary":
