@@ -1,6 +1,7 @@
 """Models shared by many tests."""
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,26 @@ def supported(model, **held):
     for group, given in held.items():
         model.prescribe(group, **given) if isinstance(given, dict) else model.fix(group, given)
     return model
+
+
+def with_contact(model, name, secondary, primary, **options):
+    """Add a contact pair to a model; return the model."""
+    model.add_contact(name, secondary=secondary, primary=primary, **options)
+    return model
+
+
+def with_obstacle(model, name, secondary, obstacle, **options):
+    """Add a rigid obstacle to a model; return the model."""
+    model.add_obstacle(name, secondary=secondary, obstacle=obstacle, **options)
+    return model
+
+
+def last_step(model, ramp=1, about="", **options):
+    """Solve a model; return the last step and the texts of those warnings raised meanwhile that contain `about`."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        step = fc.solve(model, ramp, **options)[-1]
+    return step, [text for text in (str(w.message) for w in caught) if about in text]
 
 
 def pressed_spheres(mesh, by=2.0, name="hertz", material=None, strain="small", **options):

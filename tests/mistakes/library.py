@@ -115,8 +115,7 @@ def with_orphan():
     mesh = mesh.replace(
         points=np.vstack([mesh.points, [[20.0, 0.0]]]), point_groups={**mesh.point_groups, "LONE": [lone]}
     )
-    model = blocks(mesh)
-    return supported(model, LONE="x")
+    return supported(blocks(mesh), LONE="x")
 
 
 def with_load(add, **options):
@@ -139,8 +138,7 @@ def with_obstacle(height, normal=(0.0, -1.0), motion=None):
 
 
 def empty_group(name):
-    mesh = block_on_block()
-    return mesh.with_groups(cells={name: []})
+    return block_on_block().with_groups(cells={name: []})
 
 
 # fmt: off
@@ -280,8 +278,7 @@ def pushed(E, pressure):
 
 
 def stretched(length):
-    model = square(BOTTOM="xy")
-    return supported(model, TOP={"y": length})
+    return supported(square(BOTTOM="xy"), TOP={"y": length})
 
 
 # fmt: off
@@ -322,13 +319,11 @@ def on_axis(add):
 
 
 def sliding():
-    model = blocks(supports=False)
-    return supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"y": -0.01})
+    return supported(blocks(supports=False), LOWER_BOTTOM="xy", UPPER_TOP={"y": -0.01})
 
 
 def contradicting():
-    model = blocks()
-    return supported(model, UPPER_TOP={"y": 0.5})
+    return supported(blocks(), UPPER_TOP={"y": 0.5})
 
 
 def split_in_two():
@@ -353,8 +348,7 @@ def pushed_into_each_other():
 
 
 def corner_pushed():
-    model = with_obstacle(1.0)
-    return supported(model, LEFT={"y": 0.0})
+    return supported(with_obstacle(1.0), LEFT={"y": 0.0})
 
 
 # fmt: off
@@ -425,8 +419,7 @@ def inner_contact():
     number = mesh.offsets["line2"] + len(inner) - 1
     # Lines come last, so that no number moves.
     mesh = mesh.replace(cells={**mesh.cells, "line2": inner}).with_groups(cells={"INNER": [number]})
-    pair = blocks(mesh, contact=False)
-    pair.add_contact("pair", secondary="INNER", primary="CONT_UPPER")
+    blocks(mesh, contact=False).add_contact("pair", secondary="INNER", primary="CONT_UPPER")
 
 
 def lifted():
@@ -495,8 +488,7 @@ RAMP = [
 
 
 def short_history():
-    model = blocks()
-    return supported(model, LOWER_LEFT={"x": 0.0, "ramp": [(0.0, 0.0), (0.5, 1.0)]})
+    return supported(blocks(), LOWER_LEFT={"x": 0.0, "ramp": [(0.0, 0.0), (0.5, 1.0)]})
 
 
 # fmt: off

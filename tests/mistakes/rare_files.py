@@ -74,8 +74,7 @@ def vanished(folder):
 
 
 def packed_of_another_kind():
-    values = packing.pack({"a": np.arange(3.0)})
-    raw = values.tobytes().replace(b"<f8", b"|O8")
+    raw = packing.pack({"a": np.arange(3.0)}).tobytes().replace(b"<f8", b"|O8")
     line, _, body = raw.partition(b"\n")
     old = b"%d" % zlib.crc32(body.replace(b"|O8", b"<f8"))
     packing.unpack(np.frombuffer(line.replace(old, b"%d" % zlib.crc32(body)) + b"\n" + body, np.uint8))
@@ -110,8 +109,7 @@ def broken_point_numbers(file):
 
 
 def cell_field_cut_off(file):
-    n = len(file["VTKHDF/Types"])
-    file["VTKHDF/CellData"].create_dataset("error", data=np.zeros(n - 1))
+    file["VTKHDF/CellData"].create_dataset("error", data=np.zeros(len(file["VTKHDF/Types"]) - 1))
 
 
 def announced(folder):

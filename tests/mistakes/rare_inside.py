@@ -12,6 +12,7 @@ import h5py
 import meshio
 import numpy as np
 from library import blocks, lifted, solved
+from models import elastic_model, with_contact
 from rare_files import refusing
 from scipy.sparse import bsr_array, csr_array
 
@@ -110,9 +111,7 @@ def distorted_facets(patch):
     patch.setattr(_cut_faces._cut_faces_kernels, "integrate", lambda *_: 0)
     lower, upper = fc.generate.box(divisions=(2, 2, 2)), fc.generate.box(divisions=(2, 2, 2), origin=(0.0, 0.0, 1.0))
     mesh = fc.generate.union(renamed(lower, lambda name: f"A_{name}"), renamed(upper, lambda name: f"B_{name}"))
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
-    model.add_contact("pair", secondary="B_ZMIN", primary="A_ZMAX", formulation="mortar")
+    model = with_contact(elastic_model(mesh, "3d", E=1.0, nu=0.3), "pair", "B_ZMIN", "A_ZMAX", formulation="mortar")
     model.bind(model.contact[0]).constraints(Configuration.undeformed(mesh.points))
 
 

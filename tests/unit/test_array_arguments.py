@@ -201,8 +201,7 @@ def test_results_of_functions_of_the_caller(kind, text):
 
     points = np.zeros((3, 2))
     refused(fc.ModelError, text, evaluated, lambda x: kind(len(x)), points, "the pressure on 'TOP'")
-    side = RigidSide(Floor(kind), np.zeros(2))
-    refused(fc.ContactError, text, side.project, points, Pose(np.zeros(2)))
+    refused(fc.ContactError, text, RigidSide(Floor(kind), np.zeros(2)).project, points, Pose(np.zeros(2)))
 
 
 def test_axes_of_a_function_have_no_mask_and_are_real():

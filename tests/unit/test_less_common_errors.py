@@ -292,8 +292,7 @@ def test_stresses_along_the_normal_of_a_contact_in_the_plane():
     pytest.importorskip("matplotlib")
     mesh = fc.generate.block(divisions=(6, 6))
     found = elastic_model(mesh, "plane_strain", BOTTOM="xy")
-    top = mesh.points[:, 1].max()
-    ball = fc.obstacles.Sphere((0.4, top + 5.0), 5.0)
+    ball = fc.obstacles.Sphere((0.4, mesh.points[:, 1].max() + 5.0), 5.0)
     found.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.01})
     last = fc.solve(found, 1)[-1]
     ax = fc.plot.axis_stress(mesh, last, "ball")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from models import with_contact
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -114,9 +115,7 @@ def model_of(job, image):
         (onto,) = _components([0.0 if AXES[k] == axis else None for k in range(mesh.dim)], image, 1.0)
         model.couple(group, onto)
     for number, (secondary, primary, formulation, options) in enumerate(job.contact):
-        model.add_contact(
-            f"pair {number}", secondary=secondary, primary=primary, formulation=formulation, **_scaled(options, image)
-        )
+        with_contact(model, f"pair {number}", secondary, primary, formulation=formulation, **_scaled(options, image))
     for number, (secondary, point, normal, motion, options) in enumerate(job.obstacles):
         place = image.turned(point) + (0.0 if image.shift is None else np.asarray(image.shift))
         plane = fc.obstacles.HalfSpace(tuple(place * image.length), tuple(image.turned(normal)))

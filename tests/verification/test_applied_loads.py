@@ -1,10 +1,8 @@
 """Loads in equilibrium: exact fields, thick cylinders, coupled faces, histories, floating bodies."""
 
-import warnings
-
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, last_step, supported, with_contact, with_obstacle
 from pairwise import first_of
 
 import fastcontact as fc
@@ -100,8 +98,7 @@ def test_a_coupled_face_under_a_force_is_a_rigid_plate(solver):
     top = mesh.points_of("TOP")
 
     def prepared():
-        model = elastic_model(mesh, "plane_strain")
-        return supported(model, BOTTOM="xy")
+        return supported(elastic_model(mesh, "plane_strain"), BOTTOM="xy")
 
     forced = prepared()
     forced.couple("TOP", "y")
@@ -181,8 +178,7 @@ def driven_by_force(mesh, formulation, force, gap=0.0, **load):
     model = elastic_model(mesh.replace(points=points), "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
     model.couple("A2B2", "y")
     model.add_force("A2B2", y=-force, **load)
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
-    return model
+    return with_contact(model, "hertz", "CONT1", "CONT2", formulation=formulation)
 
 
 @pytest.mark.parametrize("solver", first_of(1, ["direct", "amg"]))
@@ -239,10 +235,7 @@ def test_a_body_that_nothing_loads_has_no_determined_position(friction):
     """It lies between two others without touching them; pushed by one of them, it has one."""
     for push, free in ((0.0, True), (0.3, False)):
         model = floating_block(push, friction)
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
-            last = fc.solve(model, fc.linear_ramp(1))[-1]
-        texts = [str(one.message) for one in told if "nothing determines the position" in str(one.message)]
+        last, texts = last_step(model, about="nothing determines the position")
         assert len(texts) == free
         assert last.iterations["regularised"]["undetermined"] == (
             {"body 'UPPER'": ["translation along y"]} if free else {}
@@ -344,8 +337,7 @@ def stack(load, motion):
     if load:
         model.add_pressure("CAP_TOP", load)
     model.add_contact("below", secondary="CONT_LOWER", primary="CONT_UPPER", formulation="continuous")
-    model.add_contact("above", secondary="CONT_CAP", primary="UPPER_TOP", formulation="continuous")
-    return model
+    return with_contact(model, "above", "CONT_CAP", "UPPER_TOP", formulation="continuous")
 
 
 def test_a_body_between_two_others_is_held_by_contact_alone():
@@ -378,8 +370,7 @@ def test_a_sub_model_follows_the_stages_of_the_global_model():
     def model(height, divisions):
         model = elastic_model(fc.generate.block((1.0, height), (4, divisions), "quad8"), "plane_strain", E=100.0)
         plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-        model.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, friction=0.3)
-        return model
+        return with_obstacle(model, "plane", "BOTTOM", plane, friction=0.3)
 
     block, half = model(1.0, 4), model(0.5, 2)
     heights = np.array([(0.5, -0.01), (1.0, -0.008)])  # an array of pairs serves as well as a list

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, with_obstacle
 from two_bodies import SIDES, blocks, boxes, each, held, touching
 
 import fastcontact as fc
@@ -70,8 +70,7 @@ def test_once_closed_means_closed_in_a_load_step_before(make, formulation, swap)
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_once_closed_leaves_the_rest_free(formulation, forma04):
     """Two half-spheres, pressed, then pulled: they hang on what had been closed, the rest opens wider."""
-    mesh = fc.generate.half_spheres("tri3", size=5.0)
-    model = forma04(mesh, formulation, kind="bilateral_once_closed")
+    model = forma04(fc.generate.half_spheres("tri3", size=5.0), formulation, kind="bilateral_once_closed")
     pressed, pulled = fc.solve(model, fc.Ramp((1.0, 2.0), ((0.0, 0.0), (1.0, 0.5), (2.0, -0.1))))
     before, after = pressed.contact["hertz"], pulled.contact["hertz"]
     assert before.force[1] * after.force[1] < 0
@@ -229,9 +228,7 @@ def test_friction_along_one_direction_alone(formulation, along, expected):
     if formulation == "obstacle":
         model.fix("U_ZMAX", "xyz")
         floor = fc.obstacles.HalfSpace(point=mesh.points[mesh.points_of("U_ZMIN")[0]], normal=(0.0, 0.0, 1.0))
-        model.add_obstacle(
-            "pair", secondary="U_ZMIN", obstacle=floor, motion={"x": -0.1, "y": -0.1, "z": 0.02}, **options
-        )
+        with_obstacle(model, "pair", "U_ZMIN", floor, motion={"x": -0.1, "y": -0.1, "z": 0.02}, **options)
     else:
         model.prescribe("U_ZMAX", x=0.1, y=0.1, z=-0.02)
         touching(model, formulation, **options)

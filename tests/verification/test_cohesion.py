@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported, united
+from models import elastic_model, made_of, supported, united, with_contact
 from pairwise import first_of
 from refusals import refused
 
@@ -33,8 +33,7 @@ def glued(element="quad4", motion=None, E=E, **options):
     model = elastic_model(mesh, "3d" if element == "hex8" else "plane_strain", E=E, nu=0.0)
     supported(model, **{f"A {bottom}": axes, f"B {top}": {**dict.fromkeys(axes, 0.0), **(motion or {axes[-1]: 1.0})}})
     law = {"strength": STRENGTH, "energy": ENERGY, "stiffness": STIFFNESS, **options.pop("law", {})}
-    model.add_contact("glue", secondary=f"B {bottom}", primary=f"A {top}", cohesion=law, **options)
-    return model
+    return with_contact(model, "glue", f"B {bottom}", f"A {top}", cohesion=law, **options)
 
 
 PATH = fc.Ramp(

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, with_contact
 from pairwise import first_of
 
 import fastcontact as fc
@@ -39,8 +39,7 @@ def pressed(mesh, formulation, swap=False, push=0.01, **options):
         supported(model, **{f"{name}_XMIN": "x", f"{name}_YMIN": "y"})
     supported(model, LOWER_ZMIN="z", UPPER_ZMAX={"z": -push})
     sides = ("UPPER_ZMIN", "LOWER_ZMAX") if swap else ("LOWER_ZMAX", "UPPER_ZMIN")
-    model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
-    return model
+    return with_contact(model, "pair", sides[0], sides[1], formulation=formulation, **options)
 
 
 def is_uniform(last, pressure, tolerance=1e-10):
@@ -95,8 +94,7 @@ def test_meshes_that_do_not_match_transmit_the_force():
 def sphere_model(mesh, formulation, swap=False, push=0.5, **options):
     model = elastic_model(mesh, "3d", E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", SPHERE_TOP={"y": -push})
     sides = ("CONT_BLOCK", "CONT_SPHERE") if swap else ("CONT_SPHERE", "CONT_BLOCK")
-    model.add_contact("hertz", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
-    return model
+    return with_contact(model, "hertz", sides[0], sides[1], formulation=formulation, **options)
 
 
 def on_rigid_plate(element, formulation, **sizes):
@@ -109,8 +107,7 @@ def on_rigid_plate(element, formulation, **sizes):
 
 def on_elastic_block(element, formulation, contact_size, swap=False, **options):
     mesh = sphere_on_block(element, size=12.5, contact_size=contact_size, contact_radius=6.0)
-    model = sphere_model(mesh, formulation, swap, **options)
-    return supported(model, BLOCK_BOTTOM="y")
+    return supported(sphere_model(mesh, formulation, swap, **options), BLOCK_BOTTOM="y")
 
 
 def measured(contact):

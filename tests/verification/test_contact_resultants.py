@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, pressed_spheres, supported, united
+from models import elastic_model, made_of, pressed_spheres, supported, united, with_contact, with_obstacle
 from refusals import refused
 
 import fastcontact as fc
@@ -39,8 +39,7 @@ def test_a_uniform_pressure(element, kinematics):
     model = column(element, kinematics=kinematics)
     pressed(model, 0.01)
     model.fix("TOP", "x")
-    steps = fc.solve(model, 2)
-    first, last = fc.contact_resultants(model, steps, "plane")
+    first, last = fc.contact_resultants(model, fc.solve(model, 2), "plane")
     area = 4.0 * np.pi if kinematics == "axisymmetric" else 2.0
     assert last.area == pytest.approx(area, rel=1e-12)
     assert last.force == pytest.approx([0.0, E * 0.01 / HEIGHT * area], rel=1e-9, abs=1e-9)
@@ -272,9 +271,7 @@ def shoe(formulation="continuous", wear=COEFFICIENT, stroke=2.0, crown=0.004, el
     model.add_force("TOP", y=-FORCE, distribute=True, ramp=PRESS)
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     options = {**options, **({} if wear is None else {"wear": wear})}
-    model.add_obstacle(
-        "sole", secondary="BOTTOM", obstacle=plane, motion={"x": stroke}, ramp=SLIDE, formulation=formulation, **options
-    )
+    with_obstacle(model, "sole", "BOTTOM", plane, motion={"x": stroke}, ramp=SLIDE, formulation=formulation, **options)
     return model
 
 
@@ -288,8 +285,7 @@ def volume(contact):
 )
 def test_the_worn_volume_is_archards(formulation, options):
     """Coefficient times force times path, whatever the pressures are: at all instants."""
-    model = shoe(formulation, crown=0.05, **options)
-    steps = fc.solve(model, [float(k) for k in range(1, 12)])
+    steps = fc.solve(shoe(formulation, crown=0.05, **options), [float(k) for k in range(1, 12)])
     assert steps[0].contact["sole"].wear.max() < 2e-6  # the sole widens a little as it is pressed
     for step in steps[2:]:  # in the second step the sole is dragged along a little before it slides, with friction
         worn = volume(step.contact["sole"]) - volume(steps[1].contact["sole"])
@@ -392,8 +388,7 @@ def test_the_work_of_the_load_on_a_worn_block_is_balanced(friction):
 @pytest.mark.parametrize("formulation", ["node_to_segment", pytest.param("continuous", marks=pytest.mark.slow)])
 def test_a_shoe_wears_in_until_it_presses_evenly(formulation):
     """A guided shoe that wears everywhere alike presses everywhere alike: its force over its area."""
-    model = shoe(formulation, wear=4e-5)
-    last = fc.solve(model, np.linspace(1.0, 91.0, 138))[-1].contact["sole"]
+    last = fc.solve(shoe(formulation, wear=4e-5), np.linspace(1.0, 91.0, 138))[-1].contact["sole"]
     inside = np.abs(last.coordinates[:, 0]) < 0.95
     assert last.active.all()
     assert last.pressure[inside] == pytest.approx(np.full(inside.sum(), FORCE / 2.0), rel=0.02)
@@ -421,9 +416,7 @@ def test_bodies_wear_on_the_secondary_side(multipliers):
     model.add_force("UPPER_TOP", y=-FORCE, distribute=True, ramp=PRESS)
     there = [(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (3.0, -1.0), (4.0, 1.0), (5.0, -1.0)]
     model.prescribe("UPPER_TOP", x=0.3, ramp=there)
-    model.add_contact(
-        "sole", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="mortar", wear=5e-4, multipliers=multipliers
-    )
+    with_contact(model, "sole", "CONT_UPPER", "CONT_LOWER", formulation="mortar", wear=5e-4, multipliers=multipliers)
     steps = fc.solve(model, [1.0, 2.0, 3.0, 4.0, 5.0])
     before, last = steps[0].contact["sole"], steps[-1].contact["sole"]
     assert volume(last) - volume(before) == pytest.approx(5e-4 * FORCE * 0.3 * 7.0, rel=0.01)
@@ -472,14 +465,8 @@ def test_a_block_in_space_wears_along_any_way(formulation):
     model.couple("ZMAX", "z")
     model.add_force("ZMAX", z=-FORCE, distribute=True, ramp=PRESS)
     plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    model.add_obstacle(
-        "sole",
-        secondary="ZMIN",
-        obstacle=plane,
-        motion={"x": 0.6, "y": -0.8},
-        ramp=SLIDE,
-        formulation=formulation,
-        wear=1e-4,
+    with_obstacle(
+        model, "sole", "ZMIN", plane, motion={"x": 0.6, "y": -0.8}, ramp=SLIDE, formulation=formulation, wear=1e-4
     )
     steps = fc.solve(model, [1.0, 2.0, 3.0, 4.0])
     contact = steps[-1].contact["sole"]
@@ -513,8 +500,7 @@ def test_bodies_in_space_that_slide_over_their_edges():
 
 def test_the_moment_in_finite_strain_balances_the_reactions_at_their_deformed_positions(tmp_path):
     mesh = fc.generate.block((4.0, 2.0), (4, 3), "quad8")
-    model = fc.Model(mesh, kinematics="plane_strain", strain="finite")
-    model.add_material(fc.NeoHookean(E=2.5, nu=0.4))
+    model = made_of(mesh, "plane_strain", fc.NeoHookean(E=2.5, nu=0.4), strain="finite")
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=0.5, formulation="mortar")
     model.prescribe("TOP", x=0.8, y=-0.3)

@@ -354,6 +354,5 @@ def test_one_node_is_joined_with_all_of_a_group():
 )
 def test_mistakes_are_told(method, arguments, words):
     mesh = fc.generate.with_reference_points(two_blocks("quad4"), {"PIN": (1.0, 1.2)})
-    side = mesh.points_of("LEFT2")
-    model = model_on(mesh.with_groups(points={"SIDE": side}))
+    model = model_on(mesh.with_groups(points={"SIDE": mesh.points_of("LEFT2")}))
     refused(fc.ModelError, words, getattr(model, method), **arguments)

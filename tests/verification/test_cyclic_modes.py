@@ -177,8 +177,7 @@ def test_shapes_of_the_whole_ring(tmp_path):
     ring = found.whole_ring()
     merged = whole(part, 6)
     place = np.linalg.norm(merged.points[:, None] - ring.mesh.points[None], axis=2).argmin(axis=1)
-    alike = model_of(merged)
-    together = fc.modes(alike, n=14)
+    together = fc.modes(model_of(merged), n=14)
     ends = np.concatenate([part.points_of("RING FIRST"), part.points_of("RING SECOND")])
     inside = ~np.isin(place % part.n_points, ends)  # nodal stresses of a sector end with it
     for k, mode in enumerate(ring):

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, pressed_spheres, united
+from models import elastic_model, made_of, pressed_spheres, united, with_contact, with_obstacle
 from pairwise import first_of
 
 import fastcontact as fc
@@ -131,8 +131,7 @@ def ring(free: bool):
     else:
         model.fix("A1B1", "y")
     plate = fc.obstacles.HalfSpace(point=(0.0, 2.5), normal=(0.0, -1.0))
-    model.add_obstacle("plate", secondary="CONT1", obstacle=plate, motion={"y": -0.625 * (1 + free)})
-    return model
+    return with_obstacle(model, "plate", "CONT1", plate, motion={"y": -0.625 * (1 + free)})
 
 
 @pytest.mark.filterwarnings("ignore:contact .* has only 3 elements")
@@ -223,8 +222,7 @@ def test_a_rubber_cord_without_friction_that_can_rotate_is_squeezed_as_one_that_
         mesh = mesh.with_facet_group(name, lambda at, sign=sign: (np.hypot(*at.T) > 2.4) & (sign * at[:, 1] > -1e-6))
     forces = []
     for held in ("MIDDLE", "AXIS"):
-        model = made_of(mesh, "plane_strain", fc.NeoHookean(E=6.0, nu=0.4995), strain="finite")
-        model.fix(held, "x")
+        model = made_of(mesh, "plane_strain", fc.NeoHookean(E=6.0, nu=0.4995), strain="finite", **{held: "x"})
         for name, side, y, motion in (("floor", "LOWER", -2.5, None), ("lid", "UPPER", 2.5, {"y": -1.25})):
             plate = fc.obstacles.HalfSpace((0.0, y), (0.0, -np.sign(y)))
             model.add_obstacle(name, secondary=side, obstacle=plate, motion=motion, **options)
@@ -310,8 +308,7 @@ def half_spheres(mesh, **options):
 def ball_on_block(element, **options):
     mesh = fc.generate.sphere_on_block(element, contact_size=4.0, contact_radius=8.0)
     model = elastic_model(mesh, E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -2.0})
-    model.add_contact("hertz", secondary="CONT_SPHERE", primary="CONT_BLOCK", **options)
-    return model
+    return with_contact(model, "hertz", "CONT_SPHERE", "CONT_BLOCK", **options)
 
 
 def ball_on_ball(element, **options):
@@ -319,8 +316,7 @@ def ball_on_ball(element, **options):
     mesh = fc.generate.sphere_octant(element, contact_size=4.0, contact_radius=8.0)
     model = elastic_model(mesh, E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", SPHERE_TOP={"y": -1.0})
     ball = fc.obstacles.Sphere(centre=(0.0, -60.0, 0.0), R=60.0)
-    model.add_obstacle("hertz", secondary="CONT_SPHERE", obstacle=ball, **options)
-    return model
+    return with_obstacle(model, "hertz", "CONT_SPHERE", ball, **options)
 
 
 def blocks(mesh, drawn=None, shift=4.0, sides=("CONT_UPPER", "CONT_LOWER"), **options):
@@ -330,8 +326,7 @@ def blocks(mesh, drawn=None, shift=4.0, sides=("CONT_UPPER", "CONT_LOWER"), **op
     model = elastic_model(
         mesh, LOWER_BOTTOM="xy", **({"UPPER_TOP": {"x": 0.05, "y": -0.05}} if drawn is None else drawn)
     )
-    model.add_contact("hertz", secondary=sides[0], primary=sides[1], **options)
-    return model
+    return with_contact(model, "hertz", sides[0], sides[1], **options)
 
 
 def punch(mesh, **options):
@@ -346,8 +341,7 @@ def seam(mesh, **options):
     mesh = united(LOWER_=lower, UPPER_=fc.generate.block((6.0, 3.0), (9, 4), mesh, (4.0, 4.0)))
     model = elastic_model(mesh, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
     model.add_contact("hertz", secondary="UPPER_BOTTOM", primary="LOWER_TOP", **options)
-    model.add_contact("seam", secondary="LOWER_A", primary="LOWER_B", formulation="node_to_segment")
-    return model
+    return with_contact(model, "seam", "LOWER_A", "LOWER_B", formulation="node_to_segment")
 
 
 def shell(element, divisions, radii, angle, group, double):
@@ -368,8 +362,7 @@ def nested(mesh, **options):
     inner = shell(element, (3, 3, 1), (1.7, 2.0), 0.4, "SECONDARY", double)
     mesh = fc.generate.union(inner, shell(element, (5, 5, 1), (2.0, 2.4), 0.5, "PRIMARY", double))
     model = elastic_model(mesh, E=200.0, OUTSIDE="xyz", INSIDE={"x": 0.002, "y": 0.003, "z": 0.03})
-    model.add_contact("hertz", secondary="SECONDARY", primary="PRIMARY", **options)
-    return model
+    return with_contact(model, "hertz", "SECONDARY", "PRIMARY", **options)
 
 
 def pressed_ball(element, **options):
@@ -377,8 +370,7 @@ def pressed_ball(element, **options):
     mesh = fc.generate.sphere_on_block(element, contact_size=4.0, contact_radius=8.0)
     model = elastic_model(mesh, E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y")
     model.add_pressure("SPHERE_TOP", 20.0)
-    model.add_contact("hertz", secondary="CONT_SPHERE", primary="CONT_BLOCK", **options)
-    return model
+    return with_contact(model, "hertz", "CONT_SPHERE", "CONT_BLOCK", **options)
 
 
 def loose_blocks(mesh, **options):

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from case_texts import case_of
-from models import elastic_model, made_of
+from models import elastic_model, made_of, with_obstacle
 from refusals import refused
 
 import fastcontact as fc
@@ -22,14 +22,12 @@ def block_under_a_ball(kinematics, element="quad4", centre=3.0, **options):
     left = 0.0 if kinematics == "axisymmetric" else -1.0
     model = elastic_model(fc.generate.block((2.0, 1.0), (16, 8), element, origin=(left, -1.0)), kinematics, BOTTOM="y")
     model.fix("LEFT" if kinematics == "axisymmetric" else "BOTTOM", "x")
-    model.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, centre), 3.0), **options)
-    return model
+    return with_obstacle(model, "ball", "TOP", fc.obstacles.Sphere((0.0, centre), 3.0), **options)
 
 
 def box_under_a_ball(element="hex8", **options):
     model = elastic_model(fc.generate.box((1.0, 1.0, 1.0), (6, 6, 3), element, (-0.5, -0.5, -1.0)), ZMIN="xyz")
-    model.add_obstacle("ball", secondary="ZMAX", obstacle=fc.obstacles.Sphere((0.0, 0.0, 3.0), 3.0), **options)
-    return model
+    return with_obstacle(model, "ball", "ZMAX", fc.obstacles.Sphere((0.0, 0.0, 3.0), 3.0), **options)
 
 
 def same(moved, pushed, tolerance=1e-8):
@@ -101,8 +99,7 @@ def test_a_meshed_surface_can_be_driven():
     found = []
     for shape in (surface, fc.obstacles.Sphere((0.0, 3.0), 3.0)):
         mesh = fc.generate.block((2.0, 1.0), (16, 8), "quad4", origin=(-1.0, -1.0))
-        model = elastic_model(mesh, BOTTOM="xy")
-        model.add_obstacle("ball", secondary="TOP", obstacle=shape, force={"y": -15.0})
+        model = with_obstacle(elastic_model(mesh, BOTTOM="xy"), "ball", "TOP", shape, force={"y": -15.0})
         found.append(fc.solve(model, 1)[-1].contact["ball"].obstacle_displacement[1])
     assert found[0] == pytest.approx(found[1], rel=1e-4)
 
@@ -327,14 +324,10 @@ def test_a_turn_about_a_far_centre_is_a_translation():
         model = elastic_model(fc.generate.block((4.0, 2.0), (8, 4)), BOTTOM="xy")
         plane = fc.obstacles.HalfSpace((0.0, 2.0), (0.0, -1.0))
         if rotation is None:
-            model.add_obstacle(
-                "plane", secondary="TOP", obstacle=plane, motion={"x": way}, friction=0.5, ramp=PRESS_AND_TURN
-            )
+            with_obstacle(model, "plane", "TOP", plane, motion={"x": way}, friction=0.5, ramp=PRESS_AND_TURN)
             model.contact[-1].options["clearance"] = -0.02
         else:
-            model.add_obstacle(
-                "plane", secondary="TOP", obstacle=plane, rotation=rotation, friction=0.5, clearance=-0.02
-            )
+            with_obstacle(model, "plane", "TOP", plane, rotation=rotation, friction=0.5, clearance=-0.02)
         found.append(fc.solve(model, [1.0, 3.0, 9.0])[-1])
     turned, moved = found
     assert turned.displacement == pytest.approx(moved.displacement, abs=1e-6)
@@ -359,9 +352,7 @@ def test_a_turned_tool_presses_as_one_made_so(formulation):
     for made, turned in ((0.0, 0.12), (0.12, 0.0)):
         model = elastic_model(fc.generate.block((4.0, 2.0), (20, 8), origin=(-2.0, 0.0)), BOTTOM="xy")
         rotation = {"angle": turned, "centre": (0.5, 3.0)}
-        model.add_obstacle(
-            "tool", secondary="TOP", obstacle=tool(made), rotation=rotation, motion={"y": -0.2}, formulation=formulation
-        )
+        with_obstacle(model, "tool", "TOP", tool(made), rotation=rotation, motion={"y": -0.2}, formulation=formulation)
         found.append(fc.solve(model, 1)[-1])
     assert found[0].contact["tool"].active.any()
     assert found[0].displacement == pytest.approx(found[1].displacement, abs=1e-8)
@@ -374,8 +365,7 @@ def test_slip_is_zero_where_a_point_sticks_and_the_arc_where_it_stands_still(dim
     rotation = Rotation((0.3, -0.2, 0.7)[:dim], axis, 1.0)
     side = RigidSide(fc.obstacles.Sphere((0.0,) * dim, 1.0), np.zeros(dim), rotation)
     then, now = Pose(np.full(dim, 0.1), 0.4), Pose(np.array([0.3, -0.2, 0.5])[:dim], 1.1)
-    rng = np.random.default_rng(1)
-    before, centre = rng.normal(size=(5, dim)), np.array(rotation.centre)
+    before, centre = np.random.default_rng(1).normal(size=(5, dim)), np.array(rotation.centre)
     stuck = (before - centre - then.displacement) @ rotation.matrix(0.7).T + centre + now.displacement
     moved = now.displacement - then.displacement
     assert stuck - before == pytest.approx(side.rigid_motion(stuck, before, now, then), abs=1e-12)

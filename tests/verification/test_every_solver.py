@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 import pytest
 from mechanics import contact_forces, given_back, in_space, out_of_balance
-from models import elastic_model, united
+from models import elastic_model, united, with_contact, with_obstacle
 
 import fastcontact as fc
 from fastcontact.mesh.generate.box import SOLIDS
@@ -83,12 +83,10 @@ def model(kinematics, element, formulation, friction, penalty, swapped=False, ob
     options = FORMULATIONS[formulation] | {"friction": friction} | ({"penalty": penalty} if penalty else {})
     if obstacle:
         plane = fc.obstacles.HalfSpace(point=(0.0,) * mesh.dim, normal=(0.0,) * (mesh.dim - 1) + (1.0,))
-        described.add_obstacle("pair", secondary=upper, obstacle=plane, **options)
-        return described
+        return with_obstacle(described, "pair", upper, plane, **options)
     described.fix(bottom, "xyz"[: mesh.dim])
     secondary, primary = (lower, upper) if swapped else (upper, lower)
-    described.add_contact("pair", secondary=secondary, primary=primary, **options)
-    return described
+    return with_contact(described, "pair", secondary, primary, **options)
 
 
 def solved(described, solver, friction=0.0):

@@ -284,8 +284,7 @@ def balls(law, strain: str, approach: float, **options):
 
 @pytest.mark.parametrize("formulation", first_of(1, [None, "node_to_segment", "continuous"]))
 def test_two_balls_squeezed_flat(formulation: str | None) -> None:
-    law = fc.NeoHookean(E=20_000.0, nu=0.3)
-    steps, model = balls(law, "finite", 12.0, formulation=formulation)
+    steps, model = balls(fc.NeoHookean(E=20_000.0, nu=0.3), "finite", 12.0, formulation=formulation)
     force = steps[-1].contact["pair"].force[1]
     assert abs(force) == pytest.approx(3.667e6, rel=2e-3)
     assert max(len(step.iterations["history"]) for step in steps) <= 8
@@ -352,8 +351,7 @@ def test_following_pressure_is_the_derivative_of_a_volume(kinematics: str, eleme
             fc.generate.block((1.0, 1.0), (1, 1), element=element, origin=(1.0, 0.0)),
             ("BOTTOM", "RIGHT", "TOP", "LEFT"),
         )
-    rng = np.random.default_rng(0)
-    u, along = 0.1 * rng.normal(size=(2, *mesh.points.shape))
+    u, along = 0.1 * np.random.default_rng(0).normal(size=(2, *mesh.points.shape))
     pressures = [FollowerPressure(mesh, kinematics, Pressure(name, 2.0)) for name in names]
 
     def forces(displacement: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, joined, made_of, plates, supported
+from models import elastic_model, joined, made_of, plates, supported, with_contact, with_obstacle
 
 import fastcontact as fc
 
@@ -25,8 +25,7 @@ def wedge():
     model = elastic_model(mesh, "plane_strain", E=2e5, LEFT0="xy", RIGHT1="xy")
     model.add_pressure("TOP2", 10.0)
     model.add_contact("l", secondary="LEFT2", primary="RIGHT0", friction=0.3)
-    model.add_contact("r", secondary="RIGHT2", primary="LEFT1", friction=0.3)
-    return model
+    return with_contact(model, "r", "RIGHT2", "LEFT1", friction=0.3)
 
 
 def ring(radii, heights, divisions):
@@ -51,8 +50,7 @@ def gasket():
     model.fix("ZMIN0", "z")
     model.add_pressure("ZMAX2", 10.0)
     model.add_contact("lower", secondary="ZMIN1", primary="ZMAX0", friction=0.3)
-    model.add_contact("upper", secondary="ZMAX1", primary="ZMIN2", friction=0.3)
-    return model
+    return with_contact(model, "upper", "ZMAX1", "ZMIN2", friction=0.3)
 
 
 def bolt():
@@ -72,8 +70,7 @@ def bolt():
     model.add_pretension("bolt", "CUT", force=1000.0)
     model.add_contact("head", secondary="ZMINHEAD", primary="ZMAX1", friction=0.3)
     model.add_contact("nut", secondary="ZMAXNUT", primary="ZMIN0", friction=0.3)
-    model.add_contact("plates", secondary="ZMIN1", primary="ZMAX0", friction=0.3)
-    return model
+    return with_contact(model, "plates", "ZMIN1", "ZMAX0", friction=0.3)
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
@@ -108,10 +105,7 @@ def layer(contrast):
         model.fix(f"LEFT{i}", "x")
         model.add_contact(f"c{i}", secondary=f"BOTTOM{i}", primary=f"TOP{i - 1}")
     disc = fc.obstacles.Sphere((1.0, 5.0), R=2.0)
-    model.add_obstacle(
-        "disc", secondary="TOP2", obstacle=disc, motion={"y": -0.1}, friction=0.5, formulation="continuous"
-    )
-    return model
+    return with_obstacle(model, "disc", "TOP2", disc, motion={"y": -0.1}, friction=0.5, formulation="continuous")
 
 
 @pytest.mark.filterwarnings("ignore:.*element across", "ignore:Young.s moduli differ")

@@ -160,8 +160,7 @@ def test_the_force_of_a_fluid_does_not_depend_on_the_choice_of_the_secondary_sid
     for secondary, source in (("ARC", "EDGE"), ("PLATE TOP", "PLATE TOP_LEFT")):
         model = fc.Model(fc.generate.union(disc, plate), "plane_strain", strain=strain)
         model.add_material(fc.LinearElastic(E=100.0, nu=0.3) if strain == "small" else fc.NeoHookean(E=100.0, nu=0.3))
-        supported(model, **{"PLATE BOTTOM": "xy"})
-        model.prescribe("CUT", x=0.0, y=-push, ramp=HELD)
+        supported(model, CUT={"x": 0.0, "y": -push, "ramp": HELD}, **{"PLATE BOTTOM": "xy"})
         primary = {"ARC": "FACES", "PLATE TOP": "ARC"}[secondary]
         model.add_contact("seal", secondary=secondary, primary=primary, search_distance=4.0)
         model.add_fluid_pressure("seal", pressure, source=source, ramp=((0, 0), (1, 0), (2, 1)))
@@ -180,8 +179,7 @@ def test_the_force_of_a_fluid_does_not_depend_on_the_choice_of_the_secondary_sid
 def test_facets_that_two_fluids_press_on_are_told():
     model = elastic_model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_strain", E=1.0, nu=0.3, TOP="xy")
     for name, height in (("near", -0.1), ("far", -0.2)):
-        plane = fc.obstacles.HalfSpace((0.0, height), (0.0, 1.0))
-        model.add_obstacle(name, secondary="BOTTOM", obstacle=plane)
+        model.add_obstacle(name, secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, height), (0.0, 1.0)))
         model.add_fluid_pressure(name, 1e-3, source="BOTTOM_LEFT")
     with pytest.warns(fc.FastcontactWarning) as told:
         fc.solve(model, 1)

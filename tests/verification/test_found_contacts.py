@@ -163,8 +163,7 @@ def test_distance_angle_and_groups():
 @pytest.mark.parametrize(("divisions", "modulus"), [((2, 2), 9.0), ((21, 20), 2.0)])
 def test_softer_bodies_are_secondary_and_pairs_by_name_stay(divisions, modulus):
     """Also where the stiffer body is finer by less than a tenth."""
-    mesh = stacked("quad4", 2, *divisions)
-    model = made_of(mesh, "plane_strain", {"C": fc.LinearElastic(E=1.0, nu=0.3)})
+    model = made_of(stacked("quad4", 2, *divisions), "plane_strain", {"C": fc.LinearElastic(E=1.0, nu=0.3)})
     model.add_material(fc.LinearElastic(E=modulus, nu=0.3), ["A", "B"])
     model.add_contact("named", secondary="A TOP", primary="B BOTTOM")
     found = model.add_contacts(friction=0.2, kind=None)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres, supported, united
+from models import elastic_model, pressed_spheres, supported, united, with_obstacle
 from stepping import Stepping
 
 import fastcontact as fc
@@ -127,8 +127,7 @@ def test_a_load_that_turns_round_leaves_work_in_elasticity_and_friction_only(for
 @pytest.mark.parametrize("dim", [2, 3])
 def test_every_step_balances_its_energy_in_partial_slip(dim):
     # By the mean of the forces at both ends of each step, work is energy and friction.
-    mesh = blocks(dim)
-    model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d")
+    model = elastic_model(blocks(dim), "plane_strain" if dim == 2 else "3d")
     axes = "xyz"[:dim]
     model.fix("LOWER_BOTTOM" if dim == 2 else "LOWER_ZMIN", axes)
     up = {axes[-1]: -2e-3}
@@ -205,8 +204,7 @@ def ball_on_block(kinematics="axisymmetric", element="quad4", strain="small", **
     model.fix("BOTTOM", "xyz"[: mesh.dim])
     ball = fc.obstacles.Sphere(centre=(*[0.0] * (mesh.dim - 1), 10.0), R=10.0)
     driven = {"motion": {"xyz"[mesh.dim - 1]: -0.2 if solid else -0.1}, "friction": 0.3} | changes
-    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, **driven)
-    return model
+    return with_obstacle(model, "ball", "CONTACT", ball, **driven)
 
 
 def pressed_ball(solver="auto", steps=5, friction_while_touching=0.01, **changes):

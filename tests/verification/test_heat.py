@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from case_texts import case_of, contact_pair
-from models import made_of, supported
+from models import made_of, supported, with_contact
 from pairwise import first_of
 from refusals import refused
 from scipy.optimize import brentq
@@ -55,8 +55,7 @@ def two_bars(kinematics, element, **contact):
     for end, temperature in (("LOWER_BOTTOM", 0.0), ("UPPER_TOP", 100.0)):
         model.fix(end, "xyz"[: mesh.dim])
         model.fix_temperature(end, temperature)
-    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", conductance=1000.0, **contact)
-    return model
+    return with_contact(model, "c", "CONT_UPPER", "CONT_LOWER", conductance=1000.0, **contact)
 
 
 def check_bars(model, tolerance):
@@ -206,15 +205,13 @@ def test_rates_on_manufactured_solutions(kinematics, element, rate):
 
 def column(conductance, gap, alpha=1e-5, k=(50.0, 20.0), E=2e11):
     """Two bars that expand along y alone, with a gap between them, held at their outer ends."""
-    mesh = fc.generate.block_on_block("quad4", **BARS)
-    model = fc.Model(mesh, "plane_strain")
+    model = fc.Model(fc.generate.block_on_block("quad4", **BARS), "plane_strain")
     for body, own in zip(("UPPER", "LOWER"), k, strict=True):
         model.add_material(fc.LinearElastic(E=E, nu=0.0, expansion=alpha, conductivity=own), body)
     supported(model, LOWER_BOTTOM="y", UPPER_TOP="y", LOWER="x", UPPER="x")
     model.fix_temperature("UPPER_TOP", 100.0)
     model.fix_temperature("LOWER_BOTTOM", 0.0)
-    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", clearance=gap, conductance=conductance)
-    return model
+    return with_contact(model, "c", "CONT_UPPER", "CONT_LOWER", clearance=gap, conductance=conductance)
 
 
 def column_exact(h, gap, alpha=1e-5, k=(50.0, 20.0), E=2e11, L=0.1):
@@ -249,8 +246,7 @@ def test_conductance_by_pressure_and_gap_settles_with_the_expansion(law, gap):
 
 def test_tables_are_their_functions_and_steps_begin_where_others_ended():
     table = column({"pressure": [(0.0, 100.0), (1e9, 20_100.0)], "gap": [(0.0, 100.0), (1.0, 100.0)]}, 5e-5)
-    function = column(lambda p, g: 100.0 + 2e-5 * p, 5e-5)
-    one, other = fc.solve(table, 1)[-1], fc.solve(function, 3)[-1]
+    one, other = fc.solve(table, 1)[-1], fc.solve(column(lambda p, g: 100.0 + 2e-5 * p, 5e-5), 3)[-1]
     assert one.temperature == pytest.approx(other.temperature, rel=1e-8)
     assert one.displacement == pytest.approx(other.displacement, abs=1e-8 * np.abs(other.displacement).max())
 
@@ -260,9 +256,7 @@ def test_heat_of_friction_leaves_through_films():
     model = made_of(mesh, "plane_strain", fc.LinearElastic(E=1000.0, nu=0.0, conductivity=3.0), LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", y=-0.05, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (4.0, 1.0)])
     model.prescribe("UPPER_TOP", x=1.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (4.0, 2.0)])
-    model.add_contact(
-        "c", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3, friction_heat=0.9, conductance=1e3
-    )
+    with_contact(model, "c", "CONT_UPPER", "CONT_LOWER", friction=0.3, friction_heat=0.9, conductance=1e3)
     model.add_film("UPPER_TOP", 1.0, 0.0)
     model.add_film("LOWER_BOTTOM", 1.0, 0.0)
     for step in fc.solve(model, fc.Ramp((1.0, 2.0, 4.0), ((0.0, 0.0), (4.0, 4.0))))[1:]:
@@ -368,8 +362,7 @@ def bar(**constants):
 
 
 def joined(model, **options):
-    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
-    return model
+    return with_contact(model, "c", "CONT_UPPER", "CONT_LOWER", **options)
 
 
 def test_what_cannot_be_is_refused_by_its_name():

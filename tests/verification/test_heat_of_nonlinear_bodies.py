@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import made_of, supported
+from models import made_of, supported, with_contact
 from scipy.integrate import quad
 from scipy.optimize import brentq, fsolve
 
@@ -100,16 +100,14 @@ def law_of_contact(pressure, gap):
 
 def column(alpha, conductance=law_of_contact, element="quad8"):
     """Two bars that stretch along y alone, held at their outer ends."""
-    mesh = fc.generate.block_on_block(element, **BARS)
-    model = fc.Model(mesh, "plane_strain", strain="finite")
+    model = fc.Model(fc.generate.block_on_block(element, **BARS), "plane_strain", strain="finite")
     for body, own in K.items():
         model.add_material(fc.LinearElastic(E=STIFFNESS, nu=0.0, expansion=alpha, conductivity=own), body)
         model.fix(body, "x")
     supported(model, LOWER_BOTTOM="y", UPPER_TOP="y")
     model.fix_temperature("UPPER_TOP", 100.0)
     model.fix_temperature("LOWER_BOTTOM", 0.0)
-    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", conductance=conductance)
-    return model
+    return with_contact(model, "c", "CONT_UPPER", "CONT_LOWER", conductance=conductance)
 
 
 def column_exact(alpha, L=0.1):
@@ -158,9 +156,7 @@ def test_heat_is_conducted_in_the_deformed_bodies_and_across_the_deformed_contac
         model.prescribe(body, x=lambda p: 0.2 * p[:, 0], y=lambda p: -0.1 * p[:, 1])
     model.fix_temperature("UPPER_TOP", 100.0)
     model.fix_temperature("LOWER_BOTTOM", 0.0)
-    model.add_contact(
-        "c", secondary="CONT_UPPER", primary="CONT_LOWER", conductance=1000.0, kind="tied", formulation=formulation
-    )
+    with_contact(model, "c", "CONT_UPPER", "CONT_LOWER", conductance=1000.0, kind="tied", formulation=formulation)
     step = fc.solve(model, 1)[-1]
     flux = 100.0 / (0.09 / 50.0 + 1.0 / 1000.0 + 0.09 / 20.0)
     assert step.heat_flux[:, 1] == pytest.approx(-flux, rel=1e-9)
@@ -196,8 +192,7 @@ def test_films_fluxes_and_sources_count_deformed_areas_and_volumes(kinematics):
 def test_a_plastic_law_that_does_not_yield_exchanges_heat_as_a_linear_one():
     results = []
     for law in (fc.LinearElastic, lambda **given: fc.ElasticPlastic(**given, yield_stress=1e12)):
-        mesh = fc.generate.block_on_block("quad4", **BARS)
-        model = fc.Model(mesh, "axisymmetric")
+        model = fc.Model(fc.generate.block_on_block("quad4", **BARS), "axisymmetric")
         model.add_material(law(E=2e11, nu=0.3, expansion=1e-5, conductivity=50.0, volumetric="mean_dilatation"))
         supported(model, LOWER_BOTTOM="y", UPPER_TOP="y")
         model.fix_temperature("UPPER_TOP", 100.0)

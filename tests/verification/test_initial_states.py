@@ -123,8 +123,7 @@ def test_a_shrunk_hub_presses_as_lame_says():
         model = made_of(mesh, "plane_strain", materials, XAXIS="y", YAXIS="x")
         model.add_contact("fit", secondary="HUB_INNER", primary="SHAFT_OUTER", formulation="mortar")
         model.add_initial_strain("HUB", **dict.fromkeys(names, strain), axes=axes)
-        last = solved(model)
-        pressures.append(last.contact["fit"].pressure.mean())
+        pressures.append(solved(model).contact["fit"].pressure.mean())
     lame = fc.analytic.press_fit_cylinders(
         E_inner=1000.0, nu_inner=0.3, E_outer=500.0, nu_outer=0.25, inner_radius=1.0, interface_radius=2.0,
         outer_radius=3.0, interference=-strain * 2.0,

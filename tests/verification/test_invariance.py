@@ -135,8 +135,7 @@ def test_projections_far_from_the_origin(n_nodes):
 
 
 def test_tangents_turn_with_their_normals_and_are_smooth():
-    random = np.random.default_rng(4)
-    normals = np.array([0.0, 0.0, 1.0]) + 0.8 * random.uniform(-1, 1, (200, 3))
+    normals = np.array([0.0, 0.0, 1.0]) + 0.8 * np.random.default_rng(4).uniform(-1, 1, (200, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     first, second = tangents(normals)
     frames = np.stack([normals, first, second], axis=1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, with_obstacle
 from pairwise import first_of
 
 import fastcontact as fc
@@ -113,8 +113,7 @@ def drawn(element, by, friction=0.3, **options):
     mesh = fc.generate.box((2.0, 1.0, 0.5), (3, 2, 1), element)
     model = elastic_model(mesh, "3d", nu=0.0, ZMAX={"x": by, "y": 0.0, "z": -0.01}, ZMIN={"x": by, "y": 0.0})
     plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    model.add_obstacle("plane", secondary="ZMIN", obstacle=plane, friction=friction, **options)
-    return model
+    return with_obstacle(model, "plane", "ZMIN", plane, friction=friction, **options)
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])
@@ -132,8 +131,7 @@ def under_a_ball(element, size, **options):
     mesh = fc.generate.graded_block(element, width=10.0, contact_radius=2.5, contact_size=size, size=2.5)
     model = elastic_model(mesh, "3d", E=2e5, BOTTOM="z", SYMMETRY_X="x", SYMMETRY_Y="y")
     ball = fc.obstacles.Sphere((0.0, 0.0, 50.0), 50.0)
-    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={"z": -0.1}, **options)
-    return model
+    return with_obstacle(model, "ball", "CONTACT", ball, motion={"z": -0.1}, **options)
 
 
 @pytest.mark.parametrize("element", ["tet10", "hex20"])
@@ -171,9 +169,7 @@ def test_in_the_plane_the_force_is_that_of_the_continuous_form(element, kinemati
     def force(**options):
         mesh = fc.generate.graded_block(element, width=10.0, contact_radius=2.5, contact_size=0.25, size=2.5)
         model = elastic_model(mesh, kinematics, E=2e5, BOTTOM="xy", SYMMETRY_X="x")
-        model.add_obstacle(
-            "ball", secondary="CONTACT", obstacle=fc.obstacles.Sphere((0.0, 50.0), 50.0), motion={"y": -0.1}, **options
-        )
+        with_obstacle(model, "ball", "CONTACT", fc.obstacles.Sphere((0.0, 50.0), 50.0), motion={"y": -0.1}, **options)
         return fc.solve(model, 1)[-1].contact["ball"].force[1]
 
     assert force(formulation="mortar") == pytest.approx(force(formulation="continuous"), rel=2e-3)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported, united
+from models import elastic_model, made_of, supported, united, with_obstacle
 from refusals import refused
 from scipy.sparse import csr_array
 
@@ -378,8 +378,7 @@ def test_contact_stiffness_in_space_is_minus_the_second_difference_of_gaps(eleme
 
     def faced_at(u):
         moved = replace(config, displacement=u)
-        pairing = pair.pair_candidates(candidates, moved)
-        return pair.linearised_points(candidates, pairing, rows, moved, "facet")
+        return pair.linearised_points(candidates, pair.pair_candidates(candidates, moved), rows, moved, "facet")
 
     points = [faced_at(factor * du) for factor in (-1.0, 0.0, 1.0)]
     before, at_rest, after = (force @ np.einsum("nd,nd->n", p.offset, p.normal) for p in points)
@@ -438,9 +437,7 @@ def test_an_obstacle_holds_what_is_closed_and_moves_without_mass():
     for force in (None, {"y": -0.01}):
         model = model_of(bar("quad8", "plane_strain"), "plane_strain", **{"BAR BOTTOM": "xy"}, BAR={"x": 0.0})
         plate = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
-        model.add_obstacle(
-            "plate", secondary="BAR TOP", obstacle=plate, motion=None if force else {"y": -0.01}, force=force
-        )
+        with_obstacle(model, "plate", "BAR TOP", plate, motion=None if force else {"y": -0.01}, force=force)
         (step,) = fc.solve(model, 1)
         found = fc.modes(model, step, 2, stress_stiffening=False).frequencies
         assert found == pytest.approx([0.25, 0.75] if force else [0.5, 1.0], rel=1e-4)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, supported, united, with_contact
 from two_bodies import blocks, held, touching
 
 import fastcontact as fc
@@ -81,8 +81,7 @@ def pair_of(mesh, kinematics, swap, **options):
     sides = ("U_BOTTOM", "L_TOP") if mesh.dim == 2 else ("U_ZMIN", "L_ZMAX")
     secondary, primary = sides if swap else sides[::-1]
     options = {"multipliers": "dual"} | options
-    model.add_contact("pair", secondary=secondary, primary=primary, formulation="mortar", **options)
-    return model
+    return with_contact(model, "pair", secondary, primary, formulation="mortar", **options)
 
 
 def pressed(mesh, kinematics="3d", swap=False, **options):
@@ -169,9 +168,7 @@ def test_a_block_on_a_plane_of_symmetry_slides_at_the_limit(kinds):
     """Nodes in the plane have friction along it, and none across."""
     model = elastic_model(two_boxes(*kinds), E=E, nu=0.0, L_ZMIN="xyz", L_YMIN="y", U_YMIN="y", U_ZMAX="y")
     model.prescribe("U_ZMAX", x=1e-3, z=-1e-4)
-    model.add_contact(
-        "pair", secondary="U_ZMIN", primary="L_ZMAX", formulation="mortar", multipliers="dual", friction=0.3
-    )
+    with_contact(model, "pair", "U_ZMIN", "L_ZMAX", formulation="mortar", multipliers="dual", friction=0.3)
     contact = fc.solve(model, 3)[-1].contact["pair"]
     assert not contact.sticking.any()
     assert np.abs(contact.force[0] / contact.force[2]) == pytest.approx(0.3, rel=1e-3)
@@ -210,8 +207,7 @@ def test_partly_covered_facets_carry_all_the_pressure_there_is(kinds, shift):
     upper = mesh.points_of("U_BODY" if flat else "U_BOX")
     points = mesh.points.copy()
     points[upper, 0] += shift
-    pair = bound(mesh.replace(points=points))
-    part = pair.constraints(Configuration.undeformed(points))
+    part = bound(mesh.replace(points=points)).constraints(Configuration.undeformed(points))
     weight = part.areas
     weight = weight[np.isfinite(weight)]
     assert weight.min() > 0.0

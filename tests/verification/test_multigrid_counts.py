@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import cubes, elastic_model
+from models import cubes, elastic_model, with_contact
 from pairwise import first_of
 from scipy.sparse import csr_array
 from stepping import Stepping
@@ -17,15 +17,13 @@ pytestmark = pytest.mark.pairwise
 def blocks(n, formulation="node_to_segment"):
     """Return two cubes whose meshes do not match, pressed together."""
     model = elastic_model(cubes(n, round(0.7 * n)), ZMIN_LOW="xyz", ZMAX_HIGH={"x": 0.0, "y": 0.0, "z": -0.01})
-    model.add_contact("c", secondary="ZMIN_HIGH", primary="ZMAX_LOW", formulation=formulation)
-    return model
+    return with_contact(model, "c", "ZMIN_HIGH", "ZMAX_LOW", formulation=formulation)
 
 
 def sphere(size, formulation="node_to_segment"):
     mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=size, contact_size=size / 3, contact_radius=0.2)
     model = elastic_model(mesh, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.02})
-    model.add_contact("c", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
-    return model
+    return with_contact(model, "c", "CONT_SPHERE", "CONT_BLOCK", formulation=formulation)
 
 
 def prepared(model, tolerance=1e-8, steps=1):

@@ -118,8 +118,7 @@ def test_the_torque_of_a_press_fit_that_turns(dim, turned, angle, options, error
 
 @pytest.mark.filterwarnings("ignore:the energy of these load steps")
 def test_a_block_that_slides_far_needs_no_finite_strains():
-    mesh = fc.generate.block_on_block(shift=-1.0)
-    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
+    model = elastic_model(fc.generate.block_on_block(shift=-1.0), "plane_strain", LOWER_BOTTOM="xy")
     model.add_pressure("UPPER_TOP", 1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
     model.prescribe("UPPER_TOP", x=1.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.1)

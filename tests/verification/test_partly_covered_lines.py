@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, supported, united, with_contact
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
@@ -94,9 +94,7 @@ def test_contact_at_the_nodes_holds_the_node_on_the_axis(element, kind):
     model = elastic_model(mesh, "axisymmetric")
     supported(model, LOWER_LEFT="x", UPPER_LEFT="x", LOWER_BOTTOM="xy", UPPER_TOP={"y": -0.2})
     options = {"friction": 0.3} if kind == "friction" else {"kind": kind}
-    model.add_contact(
-        "pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="continuous", integration="node", **options
-    )
+    with_contact(model, "pair", "CONT_UPPER", "CONT_LOWER", formulation="continuous", integration="node", **options)
     contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["pair"]
     axis = contact.coordinates[:, 0].argmin()
     assert contact.active[axis]
@@ -108,8 +106,7 @@ def test_fewer_points_than_a_parabola_has_nodes_leave_a_line():
     mesh = fc.generate.block_on_block("quad8", divisions_lower=(3, 2), divisions_upper=(3, 2))
     model = elastic_model(mesh, "plane_strain", nu=0.0, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.0, "y": -0.02})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="mortar", n_gauss=2)
-    pair = model.bind(model.contact[0])
-    part = pair.unilateral(Configuration.undeformed(mesh.points))
+    part = model.bind(model.contact[0]).unilateral(Configuration.undeformed(mesh.points))
     assert len(part.nodal.independent) == 4
     pressure = fc.solve(model, fc.linear_ramp(1))[-1].contact["pair"].pressure
     assert pressure == pytest.approx(2.0, rel=1e-9)

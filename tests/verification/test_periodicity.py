@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from images import Image, image_of
-from models import elastic_model, made_of, supported
+from models import elastic_model, made_of, supported, with_obstacle
 from pairwise import first_of
 from refusals import refused
 from two_bodies import arcs
@@ -295,9 +295,7 @@ def test_a_period_pushed_along_a_plane_has_uniform_pressure_and_shear(element, m
     pressure = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU)) * depth / 0.5
     push = slides * mu * pressure * 0.5 * 2.0 * (1.0 + NU) / E
     model.prescribe("ZMAX", x=0.8 * push, y=0.6 * push, z=-depth)
-    model.add_obstacle(
-        "c", secondary="ZMIN", obstacle=fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), friction=mu
-    )
+    with_obstacle(model, "c", "ZMIN", fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), friction=mu)
     contact = fc.solve(model, 1)[-1].contact["c"]
     assert contact.pressure == pytest.approx(np.full(len(contact.points), pressure), rel=1e-9)
     shear = -min(slides, 1.0) * mu * pressure * np.array([0.8, 0.6, 0.0])

@@ -1,10 +1,8 @@
 """Plasticity compared with closed forms: bars, cycles, simple shear, Hill's tube; contact beyond yield."""
 
-import warnings
-
 import numpy as np
 import pytest
-from models import made_of, supported
+from models import last_step, made_of, supported, with_obstacle
 from pairwise import first_of
 
 import fastcontact as fc
@@ -171,8 +169,7 @@ def test_unloading_is_elastic_and_leaves_a_dent() -> None:
 def test_contact_almost_unloaded(law):
     """Just before separation, the force of the last node is a fraction of the largest forces."""
     mesh = fc.generate.quarter_disc("tri6", R=1.0, size=0.1, contact_size=0.0008, contact_radius=0.012)
-    model = made_of(mesh, "axisymmetric", law(E=200e3, nu=0.3))
-    supported(model, A1B1="xy", A1A2="x")
+    model = made_of(mesh, "axisymmetric", law(E=200e3, nu=0.3), A1B1="xy", A1A2="x")
     flat = fc.obstacles.HalfSpace(point=(0.0, mesh.points[mesh.points_of("CONT1"), 1].max()), normal=(0.0, -1.0))
     ramp = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]
     model.add_obstacle("flat", secondary="CONT1", obstacle=flat, motion={"y": -1.9e-5}, ramp=ramp)
@@ -228,8 +225,7 @@ def punched(kinematics: str) -> fc.Model:
     mesh = fc.generate.punched_block("quad8", punch_radius=1.0, extent=13.0, edge_size=0.2)
     law = fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=300.0)
     model = made_of(mesh, kinematics, law, SYMMETRY_X="x", BOTTOM="xy")
-    model.add_obstacle("punch", secondary="TOP", obstacle=fc.obstacles.FlatPunch(1.0), motion={"y": -0.1})
-    return model
+    return with_obstacle(model, "punch", "TOP", fc.obstacles.FlatPunch(1.0), motion={"y": -0.1})
 
 
 @pytest.mark.filterwarnings("ignore:the largest plastic strain", "ignore:.*overshoot near the edge")
@@ -274,10 +270,7 @@ def test_a_surface_that_is_stretched_past_the_edge_of_a_punch_is_told(element, s
     top, normal = ("ZMAX", "z") if dim == 3 else ("TOP", "y")
     punch = fc.obstacles.FlatPunch(0.65, height=0.5)
     model.add_obstacle("punch", secondary=top, obstacle=punch, motion={normal: -0.03})
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        fc.solve(model, 1)
-    texts = [str(warning.message) for warning in told if "past the edge" in str(warning.message)]
+    _, texts = last_step(model, about="past the edge")
     share = float(texts[0].split("obstacle. ")[1].split("%")[0]) if texts else 0.0
     lost = 100.0 * (1.0 - 1.1 ** (1 - dim))
     assert share == pytest.approx(lost, abs=4.0) if strain == "small" else share < 0.5 * lost

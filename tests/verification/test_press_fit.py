@@ -1,11 +1,10 @@
 """Press fits by a negative clearance compared with Lame: only the discretisation error remains."""
 
 import re
-import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported, united
+from models import elastic_model, last_step, made_of, supported, united, with_contact
 from two_bodies import arcs, rings
 
 import fastcontact as fc
@@ -100,12 +99,9 @@ def test_the_error_told_of_integration_over_complete_facets_is_right(around, sti
         supported(model, L_LEFT="x", L_RIGHT="x", U_LEFT="x", U_RIGHT="x")
         model.add_pressure("U_TOP", 10.0)
         model.add_contact("fit", secondary="U_BOTTOM", primary="L_TOP", formulation=formulation)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            contact = fc.solve(model, 1)[-1].contact["fit"]
-        texts = [str(w.message) for w in caught if "integration points of complete facets" in str(w.message)]
+        step, texts = last_step(model, about="integration points of complete facets")
         told.append(float(re.search(r"by about ([\d.]+),", texts[0])[1]) if texts else 0.0)
-        errors_of.append(np.abs(contact.pressure - 10.0).max())
+        errors_of.append(np.abs(step.contact["fit"].pressure - 10.0).max())
     assert told[1] == 0.0
     assert errors_of[1] < 1e-8
     assert bool(told[0]) == (stiffness > 0.5) == (errors_of[0] > 0.5)
@@ -120,9 +116,7 @@ def test_in_axisymmetry_the_interface_is_exact(formulation):
         found = []
         for n in sizes:
             model = tubes(element, n, 2 if formulation == "mortar" else 3)
-            model.add_contact(
-                "fit", secondary="HUB_LEFT", primary="SHAFT_RIGHT", formulation=formulation, clearance=-INTERFERENCE
-            )
+            with_contact(model, "fit", "HUB_LEFT", "SHAFT_RIGHT", formulation=formulation, clearance=-INTERFERENCE)
             contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["fit"]
             assert np.ptp(contact.pressure) < 1e-9 * LAME.pressure
             found.append(contact.pressure.mean() / LAME.pressure - 1)
@@ -191,9 +185,7 @@ def test_fits_settle_with_the_hollow_side_secondary(element, around, multipliers
         divisions_outer=(3, around[1]),
     )  # fmt: skip
     model = elastic_model(mesh, "plane_stress", SYMMETRY_X="x", SYMMETRY_Y="y")
-    model.add_contact(
-        "fit", secondary="CONT_OUTER", primary="CONT_INNER", clearance=-0.05, multipliers=multipliers, friction=friction
-    )
+    with_contact(model, "fit", "CONT_OUTER", "CONT_INNER", clearance=-0.05, multipliers=multipliers, friction=friction)
     steps = fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
     assert steps[-1].iterations["geometry_updates"] <= 12
 

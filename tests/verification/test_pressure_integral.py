@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, supported, united, with_contact
 from pairwise import first_of
 from two_bodies import blocks, boxes, held, touching
 
@@ -170,8 +170,7 @@ def pin_in_hole(secondary, primary, **options):
     points[pin, 1] += 0.05
     model = elastic_model(mesh.replace(points=points), "plane_strain", E=210_000.0, SYMMETRY_X="x", RIM="y")
     model.add_traction("BORE", y=2000.0 / (4.0 * np.pi))
-    model.add_contact("pair", secondary=secondary, primary=primary, **options)
-    return model
+    return with_contact(model, "pair", secondary, primary, **options)
 
 
 @EVERY

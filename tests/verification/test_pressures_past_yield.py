@@ -1,11 +1,10 @@
 """Contact pressures of bodies that yield on coarse meshes: how large their errors are, and what warnings tell."""
 
 import re
-import warnings
 
 import numpy as np
 import pytest
-from models import made_of, supported, united
+from models import last_step, made_of, supported, united, with_contact
 
 import fastcontact as fc
 
@@ -17,9 +16,7 @@ EDGE = (
 
 def told(model: fc.Model, steps: int) -> tuple[fc.StepResult, list[str]]:
     """Return the last step of a model and its warnings."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fc.FastcontactWarning)
-        last = fc.solve(model, steps)[-1]
+    last, _ = last_step(model, steps)
     return last, list(last.warnings)
 
 
@@ -86,8 +83,7 @@ def dome_on_block(divisions: int, exchanged: bool, **options) -> fc.Model:
     model = made_of(united(A_=block, B_=dome), "3d", law, strain="finite", A_ZMIN="xyz", B_ZMAX="xy")
     model.prescribe("B_ZMAX", z=-0.05)
     sides = ("A_ZMAX", "B_ZMIN") if exchanged else ("B_ZMIN", "A_ZMAX")
-    model.add_contact("joint", secondary=sides[0], primary=sides[1], **options)
-    return model
+    return with_contact(model, "joint", sides[0], sides[1], **options)
 
 
 def test_exchanged_sides_differ_by_the_error_of_the_mesh() -> None:
@@ -145,3 +141,28 @@ def test_a_press_fit_past_yield(element: str, strain: str, bound: float, exchang
     middle = np.concatenate([mesh.points[cells].mean(axis=1) for cells in mesh.solids.values()])
     yielded = last.cell_fields["plastic_strain"] > 1e-6
     assert np.linalg.norm(middle[yielded], axis=1).max() == pytest.approx(c, abs=outer / 16.0)
+
+
+# First yield under a ball: at a pressure of 1.6 Y, 0.48 contact radii below the surface (Johnson, 1985, section 6.1).
+
+E, NU, Y, R = 1000.0, 0.3, 1.0, 10.0
+
+
+def test_first_yield_under_a_ball() -> None:
+    modulus = E / (1.0 - NU**2)
+    unit = np.pi * R * Y / (2.0 * modulus)  # contact radius where the largest pressure is Y
+    mesh = fc.generate.graded_block(element="quad8", width=20.0 * unit, contact_radius=2.0 * unit)
+    model = made_of(mesh, "axisymmetric", fc.ElasticPlastic(E=E, nu=NU, yield_stress=Y), SYMMETRY_X="x", BOTTOM="y")
+    force = 4.0 / 3.0 * modulus / R * unit**3  # p0 = Y; it grows with the third power
+    model.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, R), R), force={"y": -force})
+    pressures = np.array([1.5, 1.55, 1.6, 1.65, 1.7])
+    steps = fc.solve(model, pressures**3)
+    strain = [step.cell_fields["plastic_strain"].max() for step in steps]
+    first = int(np.argmax(np.array(strain) > 0.0))
+    assert strain[first] > 0.0
+    assert 1.55 <= pressures[first] <= 1.65
+    yielded = steps[first].cell_fields["plastic_strain"].argmax()
+    place = np.concatenate([mesh.points[block].mean(axis=1) for block in mesh.solids.values()])[yielded]
+    radius = pressures[first] * unit
+    assert place[0] < 0.2 * radius
+    assert place[1] == pytest.approx(-0.48 * radius, abs=0.1 * radius)

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, united, with_obstacle
 from pairwise import first_of
 
 import fastcontact as fc
@@ -17,8 +17,7 @@ FORCE, PRESSURE, RADIUS = 659_773.142, 2910.4071, 10.358557
 def half_sphere_on_plane(mesh, formulation, **options):
     model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
-    model.add_obstacle("plane", secondary="CONT1", obstacle=plane, formulation=formulation, **options)
-    return model
+    return with_obstacle(model, "plane", "CONT1", plane, formulation=formulation, **options)
 
 
 @pytest.mark.parametrize(("formulation", "element", "force", "pressure"), first_of(1, [

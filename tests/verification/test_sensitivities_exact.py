@@ -5,7 +5,7 @@ of the mesh; Hertz's powers of the force to 7 %.
 """
 
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model, made_of, supported, with_contact
 
 import fastcontact as fc
 
@@ -70,8 +70,7 @@ def ball_on_plane(force: float, size: float) -> fc.Model:
     model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
     supported(model, A1A2="x", A2B2={"y": 0.0})
     model.add_pressure("A1B1", force)
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
-    return model
+    return with_contact(model, "hertz", "CONT1", "CONT2")
 
 
 def test_hertz_and_what_scaling_leaves_the_same():

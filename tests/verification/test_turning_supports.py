@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import made_of
+from models import made_of, with_obstacle
 from refusals import refused
 
 import fastcontact as fc
@@ -89,9 +89,7 @@ def test_a_block_is_carried_round_between_two_turning_plates(element: str, formu
     rotation = {"angle": 2.0 * np.pi, "centre": (0.5, 0.2), "ramp": TURN}
     for group, side in (("TOP", 1.0), ("BOTTOM", -1.0)):
         plate = fc.obstacles.HalfSpace((0.0, 0.45 * side), (0.0, -side))
-        model.add_obstacle(
-            group, secondary=group, obstacle=plate, rotation=rotation, friction=0.5, formulation=formulation
-        )
+        with_obstacle(model, group, group, plate, rotation=rotation, friction=0.5, formulation=formulation)
     steps = fc.solve(model, [1.0, *np.linspace(1.0, 2.0, 9)[1:]])
     first, last = steps[0], steps[-1]
     for number, step in enumerate(steps):
@@ -159,5 +157,4 @@ REFUSED = {
 
 @pytest.mark.parametrize("message", REFUSED)
 def test_a_rotation_that_makes_no_sense_is_refused(message: str) -> None:
-    model = bar("plane_strain", "quad8", 1.0)
-    refused(fc.ModelError, message, model.prescribe, "RIGHT", **REFUSED[message])
+    refused(fc.ModelError, message, bar("plane_strain", "quad8", 1.0).prescribe, "RIGHT", **REFUSED[message])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from mechanics import contact_forces
-from models import elastic_model
+from models import elastic_model, with_contact
 from refusals import refused
 from two_bodies import SIDES, YOUNG, blocks, boxes, each, held, ring, touching
 
@@ -138,8 +138,7 @@ def test_a_closed_crack_carries_uniform_stress_up_to_the_node_that_its_faces_sha
 def balanced(model, step):
     """Check that internal forces are those of loads, supports and contact, node by node."""
     total = step.reaction + contact_forces(step) + sum(model.forces_by_ramp().values())
-    internal = model.internal_forces(step.displacement)
-    np.testing.assert_allclose(internal, total, atol=1e-9 * np.abs(total).max())
+    np.testing.assert_allclose(model.internal_forces(step.displacement), total, atol=1e-9 * np.abs(total).max())
 
 
 def moment(arms, forces):
@@ -208,12 +207,10 @@ def test_between_flat_sides_all_normals_are_the_same(formulation, options, kinem
 def pin_in_hole(formulation, **options):
     """A quarter of a pin that a hole with other nodes holds."""
     inner = ring("quad4", 1.0, 2.0, (6, 2), "PIN")
-    outer = ring("quad4", 2.0, 4.0, (9, 3), "HOLE")
-    mesh = fc.generate.union(inner, outer)
+    mesh = fc.generate.union(inner, ring("quad4", 2.0, 4.0, (9, 3), "HOLE"))
     model = elastic_model(mesh, "plane_strain", E=YOUNG, XAXIS="y", YAXIS="x")
     model.add_pressure("PIN_INNER", 5.0)
-    model.add_contact("pair", secondary="PIN_OUTER", primary="HOLE_INNER", formulation=formulation, **options)
-    return model
+    return with_contact(model, "pair", "PIN_OUTER", "HOLE_INNER", formulation=formulation, **options)
 
 
 @pytest.mark.filterwarnings("ignore:.*deviate from their arcs")

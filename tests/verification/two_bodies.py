@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, supported, united, with_contact
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box, renamed, union
@@ -42,8 +42,7 @@ def held(mesh, kinematics="plane_strain", approach=0.02):
 def touching(model, formulation, swap=False, **options):
     """Let the two bodies touch; return the model."""
     secondary, primary = SIDES["space" if model.mesh.dim == 3 else "plane"][:: -1 if swap else 1]
-    model.add_contact("pair", secondary=secondary, primary=primary, formulation=formulation, **options)
-    return model
+    return with_contact(model, "pair", secondary, primary, formulation=formulation, **options)
 
 
 def ring(element, inner, outer, divisions, name):

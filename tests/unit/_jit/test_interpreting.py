@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 import pytest
-from models import supported
+from models import supported, with_contact
 from new_process import printed
 
 import fastcontact as fc
@@ -98,15 +98,13 @@ def both(kernel, compared):
 def axisymmetric(element, formulation):
     model = fc.Model(fc.generate.half_spheres(element, size=12.0), "axisymmetric")
     supported(model, A1A2="x", A2B2={"y": -0.1}, A1B1={"y": 0.1})
-    model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation)
-    return model
+    return with_contact(model, "pair", "CONT1", "CONT2", formulation=formulation)
 
 
 def ball(element, formulation):
     model = fc.Model(fc.generate.sphere_on_block(element, R=1.0, size=0.5, contact_size=0.3, contact_radius=0.2), "3d")
     supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.02})
-    model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
-    return model
+    return with_contact(model, "pair", "CONT_SPHERE", "CONT_BLOCK", formulation=formulation)
 
 
 @pytest.mark.parametrize(

@@ -94,8 +94,7 @@ def test_the_start_does_not_matter_where_the_solution_is_unique():
 
 
 def test_constraints_that_repeat_each_other_share_the_force():
-    rng = np.random.default_rng(2)
-    F, free = compliance(rng, 2), np.array([[-1.0], [0.1]])
+    F, free = compliance(np.random.default_rng(2), 2), np.array([[-1.0], [0.1]])
     twice = np.kron(F, np.ones((2, 2)))
     one, both = solved(F, free, np.array([0.3])), solved(twice, np.repeat(free, 2, axis=1), np.full(2, 0.3))
     assert both.settled

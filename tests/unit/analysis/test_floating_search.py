@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, plates, supported, united
+from models import elastic_model, made_of, plates, supported, united, with_contact
 from pairwise import first_of
 from scipy.sparse import csr_array
 
@@ -204,9 +204,7 @@ def stack(dim, weakest, angle, options):
     supported(model, **{f"A_{low}": {**drive, "ramp": [(0, 0), (1, 0), (2, 1), (4, -1)]}, f"D_{side}": "normal"})
     for i, (below, above) in enumerate(("AB", "BC", "CD")):
         friction = (30.0 if i == weakest else 36.0) / WIDTHS[i + 1 :].sum()
-        model.add_contact(
-            below + above, secondary=f"{above}_{low}", primary=f"{below}_{high}", friction=friction, **options
-        )
+        with_contact(model, below + above, f"{above}_{low}", f"{below}_{high}", friction=friction, **options)
     return model, turn
 
 

@@ -199,10 +199,7 @@ def pressed_blocks(beside, driven):
     lower = fc.generate.box((2.0, 2.0, 1.0), (4, 4, 2))
     upper = fc.generate.box((1.0, 1.0, 0.5), (3, 3, 2), origin=(0.5, 0.0, 1.0))
     mesh = fc.generate.union(lower, fc.generate.renamed(upper, lambda name: f"upper {name}"))
-    model = fc.Model(mesh, kinematics="3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("YMIN", "y")
-    model.fix("upper YMIN", "y")
+    model = elastic_model(mesh, "3d", E=1000.0, nu=0.3, YMIN="y", **{"upper YMIN": "y"})
     if driven:
         model.prescribe("upper ZMAX", z=-0.01, x=0.004)
     else:

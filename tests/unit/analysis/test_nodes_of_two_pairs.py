@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, united, with_contact
 
 import fastcontact as fc
 
@@ -25,9 +25,7 @@ def pressed(pairs, element="hex8", **options):
     clearances = options.pop("clearances", (0.0, 0.0))
     for name, clearance in zip(["LEFT", "RIGHT"] if pairs == 2 else ["UZMIN"], clearances, strict=False):
         own = {"clearance": clearance} if clearance else {}
-        model.add_contact(
-            name, secondary=name, primary="LZMAX", formulation="node_to_segment", normals="facet", **options, **own
-        )
+        with_contact(model, name, name, "LZMAX", formulation="node_to_segment", normals="facet", **options, **own)
     return model
 
 
@@ -87,8 +85,7 @@ def beside_a_third_body(formulation):
     model.prescribe("UZMAX", x=0.004, y=0.0, z=-0.01)
     for name in ("LEFT", "RIGHT"):
         model.add_contact(name, secondary=name, primary="LZMAX", formulation="node_to_segment", normals="facet")
-    model.add_contact("side", secondary="UYMAX", primary="TYMIN", formulation=formulation)
-    return model
+    return with_contact(model, "side", "UYMAX", "TYMIN", formulation=formulation)
 
 
 @pytest.mark.parametrize("formulation", ["mortar", "continuous", "node_to_segment"])

@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres, united
+from models import elastic_model, pressed_spheres, united, with_contact, with_obstacle
 from stepping import Stepping
 
 import fastcontact as fc
@@ -91,8 +91,7 @@ def boxes(formulation="node_to_segment", shift=0.02, **options):
     """Two boxes, the upper one lowered and pushed aside."""
     low, up = box((10.0, 10.0, 5.0), (3, 3, 1), "hex8", (0.0, 0.0, -5.0)), box((10.0, 10.0, 5.0), (2, 2, 1))
     model = elastic_model(united(L_=low, U_=up), "3d", L_ZMIN="xyz", U_ZMAX={"x": shift, "y": 0.0, "z": -0.04})
-    model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", formulation=formulation, **options)
-    return model
+    return with_contact(model, "pair", "U_ZMIN", "L_ZMAX", formulation=formulation, **options)
 
 
 def indented(dim=2, force=True, springs=False, **options):
@@ -109,8 +108,7 @@ def indented(dim=2, force=True, springs=False, **options):
         model.add_spring(top, x=3.0)
     ball = fc.obstacles.Sphere((0.0,) * (dim - 1) + (3.0,), 3.0)
     driving = {"force": {down: -8.0}, "motion": {"x": 0.01}} if force else {"motion": {"x": 0.08, down: -0.05}}
-    model.add_obstacle("ball", secondary=top, obstacle=ball, **driving, **options)
-    return model
+    return with_obstacle(model, "ball", top, ball, **driving, **options)
 
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")

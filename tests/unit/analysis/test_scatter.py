@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, united, with_contact
 
 import fastcontact as fc
 from fastcontact.analysis.tolerances import WINDOW, ScatterWindow
@@ -54,8 +54,7 @@ def side_by_side(element="tri6", unit=(1000.0, 1.0), **options):
     model = elastic_model(mesh, "plane_strain", E=unit[0], LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=0.0, y=-0.05 * unit[1])
     options = {"formulation": "mortar", "kind": "bilateral", **options}
-    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
-    return model
+    return with_contact(model, "c", "CONT_UPPER", "CONT_LOWER", **options)
 
 
 @pytest.mark.each_value
@@ -75,8 +74,7 @@ def slender():
     up = fc.generate.block((400.0, 1.0), (133, 2))
     model = elastic_model(united(L_=low, U_=up), "plane_strain", L_BOTTOM="xy", U_LEFT="x")
     model.add_body_force(["U_BLOCK"], y=-1e-3)
-    model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
-    return model
+    return with_contact(model, "c", "U_BOTTOM", "L_TOP")
 
 
 @pytest.mark.parametrize("geometry", [1e-6, 1e-11])

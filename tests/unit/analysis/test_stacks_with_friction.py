@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, supported, united, with_contact
 from pairwise import first_of
 
 import fastcontact as fc
@@ -65,8 +65,7 @@ def light_contact_beside_a_large_force(shift):
     model = elastic_model(united(L_=part(-0.5, 6), U_=part(0.0, 5), FAR_=part(5.0, 6)), "3d", E=1.0, L_ZMIN="xyz")
     supported(model, U_ZMAX={"x": shift, "y": 0.0, "z": -0.001}, FAR_XMIN="xyz")
     model.prescribe("FAR_XMAX", x=0.2, y=0.0, z=0.0)
-    model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", formulation="mortar", multipliers="dual", friction=0.2)
-    return model
+    return with_contact(model, "c", "U_ZMIN", "L_ZMAX", formulation="mortar", multipliers="dual", friction=0.2)
 
 
 @pytest.mark.parametrize("acceptable", first_of(1, [eliminated.ACCEPTABLE, 0.0]))

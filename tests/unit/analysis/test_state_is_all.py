@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres, supported
+from models import elastic_model, pressed_spheres, supported, with_contact, with_obstacle
 
 import fastcontact as fc
 from fastcontact.analysis import restart
@@ -26,23 +26,20 @@ def lying_block(**options):
     """Return a block that a pressure presses on another one, held by contact alone along y."""
     model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain", LOWER_BOTTOM="xy", UPPER_LEFT="x")
     model.add_pressure("UPPER_TOP", 5.0)
-    model.add_contact("seam", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
-    return model
+    return with_contact(model, "seam", "CONT_UPPER", "CONT_LOWER", **options)
 
 
 def pressed_disc():
     """Return a block into which a force presses a rigid disc."""
     model = elastic_model(fc.generate.block((4.0, 1.0), (16, 4)), "plane_strain", BOTTOM="xy")
     disc = fc.obstacles.Sphere((2.0, 3.0), R=2.0)
-    model.add_obstacle("disc", secondary="TOP", obstacle=disc, force={"y": -3.0}, motion={"x": 0.0}, friction=0.3)
-    return model
+    return with_obstacle(model, "disc", "TOP", disc, force={"y": -3.0}, motion={"x": 0.0}, friction=0.3)
 
 
 def sphere_on_block(element="hex8", **options):
     model = elastic_model(fc.generate.sphere_on_block(element, size=25.0, contact_size=4.0), "3d", E=20_000.0)
     supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -1.0})
-    model.add_contact("hertz", secondary="CONT_SPHERE", primary="CONT_BLOCK", **options)
-    return model
+    return with_contact(model, "hertz", "CONT_SPHERE", "CONT_BLOCK", **options)
 
 
 CASES = {

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres, supported
+from models import elastic_model, pressed_spheres, supported, with_contact, with_obstacle
 from pairwise import first_of
 from stepping import Stepping
 
@@ -114,9 +114,7 @@ def test_remedies_that_do_not_exist_are_not_named():
 
 def driven(**options):
     model = elastic_model(block((2.0, 1.0), (16, 8), "quad4", origin=(-1.0, -1.0)), "plane_strain", BOTTOM="xy")
-    ball = fc.obstacles.Sphere((0.0, 3.0), 3.0)
-    model.add_obstacle("ball", secondary="TOP", obstacle=ball, friction=0.2, **options)
-    return model
+    return with_obstacle(model, "ball", "TOP", fc.obstacles.Sphere((0.0, 3.0), 3.0), friction=0.2, **options)
 
 
 def floating():
@@ -124,8 +122,7 @@ def floating():
     model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1="y")
     model.add_force("A2B2", y=-3e5)
     model.couple("A2B2", "y")
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
-    return model
+    return with_contact(model, "hertz", "CONT1", "CONT2")
 
 
 MODELS = {

@@ -229,8 +229,7 @@ def test_series_is_long_enough(ratio, load, monkeypatch):
 
 
 def test_wide_load_goes_straight_through():
-    contact = layer(0.5, 8.0)
-    np.testing.assert_allclose(contact.pressure([0.0, 2.0, 4.0]), 1.0 / 16.0, rtol=2e-3)
+    np.testing.assert_allclose(layer(0.5, 8.0).pressure([0.0, 2.0, 4.0]), 1.0 / 16.0, rtol=2e-3)
 
 
 def test_plane_strain_counts_with_plane_strain_moduli():

@@ -273,8 +273,7 @@ def written(folder, asked, options=""):
 
 
 def test_they_are_in_the_summary(folder, capsys):
-    asked = ASKED.replace("UPPER_LEFT_BOTTOM", "UPPER_TOP_LEFT")
-    written(folder, asked)
+    written(folder, ASKED.replace("UPPER_LEFT_BOTTOM", "UPPER_TOP_LEFT"))
     assert main(["run", "case.toml", "--json", "summary.json"]) == 0
     assert "sensitivities of contact_force c y (value " in capsys.readouterr().out
     force, height = json.loads((folder / "summary.json").read_text())["sensitivities"]

@@ -113,8 +113,7 @@ def wrong_of(label: str, place, value: object, folder) -> str | None:
 
 @pytest.mark.parametrize("value", [*WRONG, *(pytest.param(v, marks=pytest.mark.slow) for v in FURTHER)], ids=repr)
 def test_every_key(value, tmp_path, monkeypatch):
-    made_once = functools.cache(fc.generate.block_on_block)
-    monkeypatch.setitem(fc.generate.GENERATORS, "block-on-block", made_once)
+    monkeypatch.setitem(fc.generate.GENERATORS, "block-on-block", functools.cache(fc.generate.block_on_block))
     assert [told for label, place in places() if (told := wrong_of(label, place, value, tmp_path))] == []
 
 

@@ -403,8 +403,7 @@ def test_a_strict_run_tells_the_checks_that_fail(tmp_path, capsys):
 @pytest.mark.filterwarnings("ignore:contact 'ceiling' never closed")
 def test_the_contact_that_was_taken_is_told_where_there_are_two(tmp_path, capsys):
     case = pressed_spheres(fc.generate.half_spheres(size=25.0))
-    far = fc.obstacles.HalfSpace((0.0, 500.0), (0.0, -1.0))
-    case.add_obstacle("ceiling", secondary="A2B2", obstacle=far)
+    case.add_obstacle("ceiling", secondary="A2B2", obstacle=fc.obstacles.HalfSpace((0.0, 500.0), (0.0, -1.0)))
     path = tmp_path / "two.vtkhdf"
     with fc.ResultWriter(path, case) as out:
         fc.solve(case, 1, on_step=out.write)

@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, united, with_obstacle
 
 import fastcontact as fc
 from fastcontact.contact import multiplier_field
@@ -120,8 +120,7 @@ def pressed(element, **options):
     if mesh.dim == 3:
         model.fix("SYMMETRY_Y", "y")
     ball = fc.obstacles.Sphere((0.0,) * (mesh.dim - 1) + (50.0,), 50.0)
-    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={up: -0.1}, **options)
-    return model
+    return with_obstacle(model, "ball", "CONTACT", ball, motion={up: -0.1}, **options)
 
 
 @pytest.mark.parametrize(("element", "expected"), CHOICES.items())

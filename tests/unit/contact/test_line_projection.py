@@ -135,8 +135,7 @@ def mixed():
 
 
 def above(n, seed=0, beside=0.1):
-    rng = np.random.default_rng(seed)
-    return rng.uniform([-beside, -beside, 0.9], [1 + beside, 1 + beside, 1.2], (n, 3))
+    return np.random.default_rng(seed).uniform([-beside, -beside, 0.9], [1 + beside, 1 + beside, 1.2], (n, 3))
 
 
 @pytest.mark.parametrize("element", KINDS)

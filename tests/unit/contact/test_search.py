@@ -194,8 +194,7 @@ def test_facets_of_a_sphere_have_outward_normals_of_their_order(name):
     def ball(theta, phi, radius):
         return radius * np.stack([np.cos(theta) * np.cos(phi), np.sin(theta) * np.cos(phi), np.sin(phi)], axis=-1)
 
-    rng = np.random.default_rng(1)
-    angle = rng.uniform(-0.39, 0.39, (2, 200))
+    angle = np.random.default_rng(1).uniform(-0.39, 0.39, (2, 200))
     for radius in (11.0, 9.5):
         found = closest(ball(*angle, radius), ball(theta, phi, 10.0))
         assert np.abs(found.distance - abs(radius - 10)).max() < (3e-2 if element.order == 1 else 2e-4)

@@ -1,11 +1,10 @@
 """Surface smoothing: exact on circles, cylinders and spheres, no effect on flat sides; messages."""
 
 import re
-import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of, supported
+from models import elastic_model, last_step, made_of, supported, with_contact
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
@@ -96,8 +95,7 @@ def test_only_the_curvature_that_both_sides_share_counts():
     same = Smoothing(both.secondary, both.secondary)  # convex on convex
     assert same.height_factors(np.array([3]), np.array([4]), (axes[0], axes[0])) == pytest.approx(np.zeros((1, 2)))
     mesh = fc.generate.sphere_on_block()
-    model = made_of(mesh, "3d", STEEL)
-    model.add_contact("ball", secondary="CONT_SPHERE", primary="CONT_BLOCK")
+    model = with_contact(made_of(mesh, "3d", STEEL), "ball", "CONT_SPHERE", "CONT_BLOCK")
     assert model.bind(model.contact[0]).smoothing is None
 
 
@@ -106,8 +104,7 @@ def fit(element="quad4", divisions=(24, 36), clearance=-0.05, **options):
     model = made_of(mesh, "plane_strain", STEEL, SYMMETRY_X="x", SYMMETRY_Y="y")
     if clearance is not None:
         options["clearance"] = clearance
-    model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", **options)
-    return model
+    return with_contact(model, "fit", "CONT_INNER", "CONT_OUTER", **options)
 
 
 @pytest.mark.parametrize("options", [
@@ -126,10 +123,8 @@ def test_rings_touch_all_round_where_their_circles_do(options):
 
 def warned(model):
     """Solve a model; return the result of the fit and the warnings about the chords of its facets."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        contact = fc.solve(model, 1)[-1].contact["fit"]
-    return contact, [text for text in map(str, (w.message for w in caught)) if "deviate from their arcs" in text]
+    step, texts = last_step(model, about="deviate from their arcs")
+    return step.contact["fit"], texts
 
 
 @pytest.mark.parametrize(("options", "told"), [
@@ -182,9 +177,7 @@ def test_errors_of_chords_against_exact_shapes_are_told_from_one_twentieth_on(n,
         model = fit(divisions=(n, n), kind="tied", clearance=None)
         rod = fc.obstacles.Sphere(centre=(0.0, 0.0), R=20.05)
         model.add_obstacle("rod", secondary="BORE", obstacle=rod, formulation=kind)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            contacts.append(fc.solve(model, 1)[-1])
+        contacts.append(last_step(model)[0])
     texts = [[text for text in step.warnings if "deviate from their arcs" in text] for step in contacts]
     pressure, exact = (step.contact["rod"].pressure.mean() for step in contacts)
     assert len(texts[0]) == told == (pressure > 1.05 * exact)

@@ -250,8 +250,7 @@ def test_supports_with_other_histories_clash(model):
 
 
 def test_motions_that_relations_stop_are_no_longer_free():
-    mesh = block("quad4", bend=False)
-    model = elastic_model(mesh, "plane_strain", BOTTOM_LEFT="xy")
+    model = elastic_model(block("quad4", bend=False), "plane_strain", BOTTOM_LEFT="xy")
     refused(fc.ModelError, r"1 rigid-body motion is not restrained: body 'BLOCK'.*rotation", model.check)
     model.relate([("BOTTOM_RIGHT", "y", 1.0)])
     model.check()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import supported, united
+from models import supported, united, with_contact
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
@@ -24,8 +24,7 @@ def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, along=
     model.add_material(fc.LinearElastic(ratio, 0.3), groups=["L_BOX"])
     model.add_material(fc.LinearElastic(1.0, 0.3), groups=["U_BOX"])
     supported(model, L_ZMIN="xyz", U_ZMAX={"x": along if friction else 0.0, "y": 0.0, "z": -0.01})
-    model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", friction=friction, **options)
-    return model
+    return with_contact(model, "c", "U_ZMIN", "L_ZMAX", friction=friction, **options)
 
 
 def box(divisions=(7, 6, 5), E=10.0):

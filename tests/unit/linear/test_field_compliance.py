@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, with_obstacle
 from pairwise import first_of
 from pressed_blocks import assert_agree, box, pressed
 from scipy.sparse import csr_array
@@ -99,8 +99,7 @@ def on_obstacle(obstacle, element="hex8"):
     divisions = (8, 8, 4) if element == "hex8" else (4, 4, 2)
     mesh = fc.generate.box((1.0, 1.0, 0.5), divisions, element)
     model = elastic_model(mesh, "3d", E=1.0, ZMAX={"x": 0.0, "y": 0.0, "z": -0.01})
-    model.add_obstacle("c", secondary="ZMIN", obstacle=obstacle, formulation="continuous")
-    return model
+    return with_obstacle(model, "c", "ZMIN", obstacle, formulation="continuous")
 
 
 def loaded(projection, rows):
@@ -114,8 +113,7 @@ def beside_another(**options):
     """A pair of points beside one of nodes with `options`."""
     model = continuous(0.02)
     wall = fc.obstacles.HalfSpace((1.001, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    model.add_obstacle("wall", secondary="U_XMAX", obstacle=wall, formulation="node_to_segment", **options)
-    return model
+    return with_obstacle(model, "wall", "U_XMAX", wall, formulation="node_to_segment", **options)
 
 
 def quadratic(element, curvature=0.0, **options):

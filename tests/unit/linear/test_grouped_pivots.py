@@ -41,8 +41,7 @@ def test_pivots_of_groups_are_their_own_and_well_conditioned(seed):
     # The first pivot of a group is its largest entry among the unknowns that no other group has.
     dense = B.toarray()
     for g in range(6):
-        others = (dense[label != g] != 0).any(axis=0)
-        own = np.abs(np.where(others, 0.0, dense[label == g]))
+        own = np.abs(np.where((dense[label != g] != 0).any(axis=0), 0.0, dense[label == g]))
         row, column = np.unravel_index(own.argmax(), own.shape)
         assert pivots[np.flatnonzero(label == g)[row]] == column
 
@@ -66,8 +65,7 @@ def test_forces_move_along_the_rows_that_multipliers_act_through():
     forces = r[tied.pivots].copy()
     moved = r.copy()
     tied.move_forces(moved)
-    multiplier = tied.multiplier(forces)
-    np.testing.assert_allclose(moved, r - through.T @ multiplier, atol=1e-12)
+    np.testing.assert_allclose(moved, r - through.T @ tied.multiplier(forces), atol=1e-12)
     assert np.abs(moved[tied.pivots]).max() < 1e-12
     assert np.abs((tied.force_weights - tied.weights).data).max() > 0.01
     symmetric = eliminate(B, np.zeros(B.shape[0]), nodes=label)
@@ -145,8 +143,7 @@ def test_equations_without_unknowns_of_their_own_leave_those_of_the_others_alone
     assert (pivots[gaps] < 2 * n + 2).all()
     assert (pivots[slips] >= 2 * n + 2).all()
     pivots, inverse = choose_pivots(B, nodes, 1)
-    P = B[:, pivots].toarray()
-    inverted = inverse.solve(P)
+    inverted = inverse.solve(B[:, pivots].toarray())
     assert inverted == pytest.approx(np.eye(2 * n), abs=1e-8)
 
 

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, with_obstacle
 from pairwise import first_of
 from pressed_blocks import assert_agree, box, pressed, solved
 from scipy.sparse import bsr_array, csr_array, diags_array
@@ -131,8 +131,7 @@ def on_wall(friction=0.0, n=8, **options):
     mesh = fc.generate.box((1.0, 1.0, 0.5), (n, n, n // 2), "hex8")
     model = elastic_model(mesh, "3d", E=1.0, ZMAX={"x": 0.004 if friction else 0.0, "y": 0.0, "z": -0.01})
     wall = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    model.add_obstacle("c", secondary="ZMIN", obstacle=wall, friction=friction, **options)
-    return model
+    return with_obstacle(model, "c", "ZMIN", wall, friction=friction, **options)
 
 
 @cache

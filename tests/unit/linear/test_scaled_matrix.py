@@ -145,8 +145,7 @@ def test_a_pattern_that_is_not_symmetric_is_stored_whole():
     assert symmetric_storage(np.array([0, 1, 2], np.int32), np.array([1, 0], np.int32)) is ALL_BLOCKS
     wrong = bsr_array((K.data, asymmetric, K.indptr), shape=K.shape)
     u = np.random.default_rng(0).normal(size=60)
-    given = ScaledMatrix(wrong, "single")
-    np.testing.assert_allclose(given @ u, wrong @ u, rtol=1e-12)
+    np.testing.assert_allclose(ScaledMatrix(wrong, "single") @ u, wrong @ u, rtol=1e-12)
 
 
 def test_an_analysis_has_the_stiffness_that_its_solver_stores(forma04):

@@ -64,8 +64,7 @@ def test_free_motions_move_no_pivot_and_yield_as_their_body_does(directions):
 
 @pytest.mark.parametrize(("directions", "tilt"), [((2,), 0.0), ((2,), 0.2), ((0, 1, 2), 0.0)])
 def test_both_sides_translate_together_where_stiffened_nodes_follow(directions, tilt):
-    rng = np.random.default_rng(5)
-    elimination = equations(directions, tilt, rng)
+    elimination = equations(directions, tilt, np.random.default_rng(5))
     followers = follower_elimination(elimination, NODES, SIZE)
     assert set(followers.pivots % SIZE) == set(directions)
     assert len(followers.pivots) > 0.7 * OPPOSITE * len(directions)
@@ -85,8 +84,7 @@ def test_both_sides_translate_together_where_stiffened_nodes_follow(directions, 
 
 
 def test_unknowns_that_move_no_pivot_by_themselves_do_not_follow():
-    rng = np.random.default_rng(7)
-    elimination = equations((2,), 0.0, rng)
+    elimination = equations((2,), 0.0, np.random.default_rng(7))
     W = elimination.weights.toarray()
     W[:, NODES[0] * SIZE + 2] = -0.1
     W = csr_array(W)

@@ -15,8 +15,7 @@ SOLID = [e for e in ALL if e.facet_elements]
 
 def interior_points(element, n=7):
     """Points inside the cell: random blends of its corners."""
-    rng = np.random.default_rng(1)
-    blend = rng.dirichlet(np.ones(element.n_corners), n)
+    blend = np.random.default_rng(1).dirichlet(np.ones(element.n_corners), n)
     return blend @ element.nodes[: element.n_corners]
 
 

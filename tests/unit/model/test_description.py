@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, with_contact, with_obstacle
 
 import fastcontact as fc
 from fastcontact.model.fingerprint import differing_parts, fingerprint
@@ -24,9 +24,7 @@ def test_every_part_is_told():
     model.add_traction("UPPER_RIGHT", x=3.0)
     model.add_spring("UPPER", y=2.0)
     model.couple("UPPER_TOP", "x")
-    model.add_contact(
-        "joint", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="mortar", friction=0.25, clearance=0.1
-    )
+    with_contact(model, "joint", "CONT_UPPER", "CONT_LOWER", formulation="mortar", friction=0.25, clearance=0.1)
     lines = model.describe().splitlines()
     assert lines[0].startswith(
         "A model in plane strain (forces are those for a depth of 1) of 73 points, 50 quad4: 146"
@@ -215,8 +213,7 @@ def model(pressure=lambda points: 1.0 + points[:, 0], height=3.0, order=1, stiff
     found.add_pressure("RIGHT", pressure)
     found.add_body_force(y=-mass)
     found.add_spring("TOP", x=stiffness)
-    found.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, height), height), motion={"y": -0.1})
-    return found
+    return with_obstacle(found, "ball", "TOP", fc.obstacles.Sphere((0.0, height), height), motion={"y": -0.1})
 
 
 def parts(**changes):

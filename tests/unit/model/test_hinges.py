@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.optimize
 from models import body_of, elastic_model, united
 from refusals import refused
 from scipy.sparse import csr_array
@@ -9,6 +10,7 @@ from scipy.sparse import csr_array
 import fastcontact as fc
 from fastcontact.contact.constraints import Constraints
 from fastcontact.model import rigid_motions
+from fastcontact.model.rigid_motions import mechanisms, stopped_at
 
 
 def pair_of(first, second):
@@ -77,8 +79,7 @@ def test_a_floor_holds_what_hangs_at_a_hinge(formulation):
 def test_a_load_away_from_the_floor_ends_with_the_name_of_the_part():
     model = elastic_model(squares(), A_BOTTOM="xy")
     model.add_body_force("B_BLOCK", y=1.0)
-    floor = fc.obstacles.HalfSpace((0.0, 0.99), (0.0, 1.0))
-    model.add_obstacle("floor", secondary="B_BOTTOM", obstacle=floor)
+    model.add_obstacle("floor", secondary="B_BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.99), (0.0, 1.0)))
     refused(fc.ConvergenceError, "'B_BLOCK' that is connected at point", fc.solve, model, fc.linear_ramp(1))
 
 
@@ -172,3 +173,29 @@ def test_halves_of_a_cut_bolt_have_its_name_and_each_motion_is_listed_once():
         r"the part around \(0\.5, 0\.5\): translation along y; the part around \(0\.5, 1\.5\): translation along y\."
     )
     refused(fc.ModelError, whole + halves, fc.solve, model, 1)
+
+
+# Motions that contact does not stop, and positions at which contact stops rigid bodies.
+
+
+def test_a_body_without_loads_stays_where_it_is() -> None:
+    """One body is pressed through a gap of 0.1; another one moves and turns between two walls, at no cost."""
+    gaps = np.array(
+        [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [0.0, -1.0, -0.5], [0.0, 1.0, -0.5], [0.0, -1.0, 0.5], [-1.0, 1.0, 0.0]]
+    )
+    gap = np.array([0.1, 0.2, 0.2, 0.2, 0.2, 0.3])
+    assert stopped_at(gaps, gap, np.array([2.0, 0.0, 0.0]), 1.0) == pytest.approx([0.1, 0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("opens", [False, True])
+def test_one_linear_programme_shows_that_contact_stops_all_motions(opens, monkeypatch) -> None:
+    """Gaps of random signs; if one opens, a motion closes none, and no load acts on it."""
+    random, count, solve = np.random.default_rng(5), [], scipy.optimize.linprog
+    monkeypatch.setattr(scipy.optimize, "linprog", lambda *args, **options: count.append(1) or solve(*args, **options))
+    gaps, motion = random.standard_normal((60, 12)), random.standard_normal(12)
+    if opens:
+        gaps *= np.sign(gaps @ motion)[:, None]
+    found = mechanisms(gaps, np.cross(motion[:3], [1.0, 2.0, 3.0])[None] @ np.eye(3, 12), np.eye(12))
+    assert found.shape == (12, int(opens))
+    assert (gaps @ found >= -1e-6).all()
+    assert opens or len(count) == 1

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from case_texts import case_of
-from models import body_of, elastic_model, supported
+from models import body_of, elastic_model, supported, with_contact
 from refusals import refused
 
 import fastcontact as fc
@@ -90,9 +90,7 @@ def test_contact_between_turned_bodies_is_the_same(formulation, solver):
         model.prescribe("UPPER_TOP", ramp=[(0, 0), (0.5, 1), (1, 0.5)], **{"normal" if turned else "y": -0.05})
         # Where supports hold nodes, the continuous one makes a shear field compliant that does no work: by axes alone.
         friction = 0.0 if formulation == "continuous" else 0.1
-        model.add_contact(
-            "pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=friction
-        )
+        with_contact(model, "pair", "CONT_UPPER", "CONT_LOWER", formulation=formulation, friction=friction)
         found.append(last(model, linear_solver=solver))
     np.testing.assert_allclose(found[1].displacement, found[0].displacement @ Q.T, atol=1e-8 * 0.05)
 
@@ -138,8 +136,7 @@ def test_nodes_coupled_along_normals_move_by_the_same():
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_part_that_repeats_itself_keeps_its_ends_together(dim):
     """Ends that move together leave no strain across: uniaxial strain, though nothing else holds the ends."""
-    mesh = block(dim, "quad8" if dim == 2 else "hex8")
-    model = elastic_model(mesh)
+    model = elastic_model(block(dim, "quad8" if dim == 2 else "hex8"))
     low, high = ("LEFT", "RIGHT") if dim == 2 else ("XMIN", "XMAX")
     model.relate_groups(low, high, "xyz"[:dim])
     bottom, top = ("BOTTOM", "TOP") if dim == 2 else ("YMIN", "YMAX")
@@ -153,12 +150,10 @@ def test_a_part_that_repeats_itself_keeps_its_ends_together(dim):
 
 
 def test_ends_may_be_strained_by_a_value():
-    mesh = block(2)
-    model = elastic_model(mesh)
+    model = elastic_model(block(2))
     model.relate_groups("RIGHT", "LEFT", "x", value=0.02)
     supported(model, BOTTOM="y", BOTTOM_LEFT="x")
-    step = last(model)
-    np.testing.assert_allclose(step.stress[:, 0], 0.01 * E / (1 - NU**2), rtol=1e-10)
+    np.testing.assert_allclose(last(model).stress[:, 0], 0.01 * E / (1 - NU**2), rtol=1e-10)
 
 
 def test_groups_are_related_along_their_normals():

@@ -7,7 +7,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from models import supported
+from models import supported, with_obstacle
 from refusals import refused
 
 import fastcontact as fc
@@ -167,8 +167,7 @@ def pressed(n=8, units="mm, N, MPa", kinematics="plane_strain"):
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
     model.fix("BOTTOM", "xy")
     disc = fc.obstacles.Sphere((2.0, 7.0), 5.0)
-    model.add_obstacle("disc", secondary="TOP", obstacle=disc, motion={"y": -0.05}, formulation="node_to_segment")
-    return model
+    return with_obstacle(model, "disc", "TOP", disc, motion={"y": -0.05}, formulation="node_to_segment")
 
 
 @pytest.fixture(scope="module")

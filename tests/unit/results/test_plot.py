@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib_pictures import contact_of, polygons_of, step_of
-from models import elastic_model
+from models import elastic_model, with_obstacle
 from pairwise import first_of
 
 import fastcontact as fc
@@ -172,9 +172,7 @@ def test_without_a_picture_or_a_window_it_says_what_to_name(result, capsys):
 def test_no_axis_no_picture(root):
     mesh = fc.generate.block((1.0, 1.0), (2, 2), "quad4", origin=(1.0, 0.0))
     model = elastic_model(mesh, "axisymmetric", BOTTOM="xy")
-    model.add_obstacle(
-        "floor", secondary="TOP", obstacle=fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0)), motion={"y": -0.01}
-    )
+    with_obstacle(model, "floor", "TOP", fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0)), motion={"y": -0.01})
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     with pytest.raises(fc.FastcontactError, match="no nodes on the axis of contact 'floor'"):
         fc.plot.axis_stress(mesh, step, "floor")

@@ -186,8 +186,7 @@ def test_a_solid_is_seen_from_where_its_extreme_is():
 
 
 def test_tetrahedra_are_cut_where_the_level_is():
-    random = np.random.default_rng(1)
-    data = random.normal(size=(200, 4, 3))
+    data = np.random.default_rng(1).normal(size=(200, 4, 3))
     normal = np.array([0.3, -0.5, 0.8])
     height = data @ normal - 0.2
     triangles, strokes = _cut_tetrahedra(data, height)
@@ -539,8 +538,7 @@ def test_a_contact_map_is_seen_along_what_carries():
 
 
 def test_a_history_of_a_contact_that_is_closed_everywhere():
-    mesh = block((1.0, 1.0), (2, 2), "quad4")
-    model = elastic_model(mesh, "plane_strain", nu=0.0, BOTTOM="xy")
+    model = elastic_model(block((1.0, 1.0), (2, 2), "quad4"), "plane_strain", nu=0.0, BOTTOM="xy")
     floor = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
     model.add_obstacle("floor", secondary="TOP", obstacle=floor, motion={"y": -0.01})
     steps = fc.solve(model, 2)

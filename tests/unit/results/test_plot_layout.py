@@ -63,8 +63,7 @@ def test_pictures_of_an_animation_are_whole_and_in_proportion(size, tmp_path, mo
 
 
 def pressed(friction):
-    mesh = fc.generate.block((4.0, 1.0), (8, 2))
-    model = elastic_model(mesh, "plane_strain", TOP={"y": -0.01})
+    model = elastic_model(fc.generate.block((4.0, 1.0), (8, 2)), "plane_strain", TOP={"y": -0.01})
     model.prescribe("TOP", x=0.001)
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=friction)
@@ -104,8 +103,7 @@ def test_forces_of_other_models_are_whole_in_a_history():
 
 
 def test_large_numbers_have_no_power_of_ten():
-    steps = pressed(0.0)
-    contact = steps[-1].contact["floor"]
+    contact = pressed(0.0)[-1].contact["floor"]
     factor = 10541.9 / contact.pressure_max
     contact.pressure[:] *= factor
     ax = fc.plot.pressure_profile(contact, units=fc.plot.UNITS)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from models import supported
+from models import supported, with_contact
 from refusals import refused
 from test_result_files import MESH, assert_holds, assert_same, nth_step, step_result
 
@@ -25,8 +25,7 @@ def spheres(E: float = 20_000.0, friction: float = 0.0, arc: float = 3.0) -> fc.
     model.add_material(fc.LinearElastic(E=E, nu=0.3))
     supported(model, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
     options = {"formulation": "node_to_segment", "friction": friction}
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
-    return model
+    return with_contact(model, "hertz", "CONT1", "CONT2", **options)
 
 
 def begun(path: Path, instants: tuple[float, ...], model: fc.Model | None = None) -> list[fc.StepResult]:
@@ -227,8 +226,7 @@ def test_a_pair_that_named_no_formulation_is_told_which_one_it_had(options: dict
 def formulated(**options: str) -> fc.Model:
     model = spheres()
     model.contact.clear()
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=0.0, **options)
-    return model
+    return with_contact(model, "hertz", "CONT1", "CONT2", friction=0.0, **options)
 
 
 def test_other_options_that_change_the_answer_are_refused(path: Path) -> None:
@@ -279,8 +277,7 @@ def test_a_folder_that_vanishes_is_told_at_the_next_step(tmp_path: Path) -> None
 def test_packed_data_come_back() -> None:
     arrays = [np.arange(6.0).reshape(2, 3), np.array([True, False]), np.empty((0, 2)), np.arange(3, dtype=np.int32).T]
     data = {"a": [1, 2.5, None, True, "é", float("inf")], "b": {"c": arrays, "": {}}, "n": np.float64(0.1)}
-    raw = pack(data)
-    found = unpack(np.concatenate([raw, np.zeros(9, np.uint8)]))
+    found = unpack(np.concatenate([pack(data), np.zeros(9, np.uint8)]))
     assert found["a"] == data["a"]
     assert found["n"] == 0.1
     for one, other in zip(found["b"]["c"], arrays, strict=True):

@@ -171,16 +171,14 @@ def test_pictures_display_themselves_and_take_axes(name, model, steps):
         "history": (steps, pair),
         "contact_zones": (steps, pair),
     }[name]
-    drawn = getattr(fc.plot, name)(*arguments)
-    png = drawn._repr_png_()
+    png = getattr(fc.plot, name)(*arguments)._repr_png_()
     assert png.startswith(b"\x89PNG")
     from matplotlib.image import imread
 
     pixels = imread(io.BytesIO(png))
     assert min(pixels.shape[:2]) > 300
     assert len(np.unique(pixels[..., :3])) > 10  # not blank
-    own = plt.Figure()
-    axes = own.subplots(1, 2)
+    axes = plt.Figure().subplots(1, 2)
     if name == "history":
         assert getattr(fc.plot, name)(*arguments, axes=axes)[0] is axes[0]
     else:
@@ -317,8 +315,7 @@ def contact_result(name: str, m: int, mesh: fc.Mesh = MESH) -> ContactResult:
 
 
 def test_contact_table() -> None:
-    step = step_result(2)
-    contact = step.contact["c"]
+    contact = step_result(2).contact["c"]
     table = contact_table(contact)
     assert table.dtype.names == (
         "point", "x", "y", "abscissa", "radius", "place", "gap", "pressure", "multiplier", "force_x", "force_y",

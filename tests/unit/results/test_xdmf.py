@@ -68,8 +68,7 @@ def unpacked(sequence: np.ndarray) -> list[tuple[int, list[int]]]:
 
 
 def test_every_reference_leads_to_the_right_numbers(sidecar: Path) -> None:
-    root = ElementTree.parse(sidecar).getroot()
-    steps = root.findall("./Domain/Grid[@CollectionType='Temporal']/Grid")
+    steps = ElementTree.parse(sidecar).getroot().findall("./Domain/Grid[@CollectionType='Temporal']/Grid")
     assert len(steps) == N_STEPS
     codes = {"quad8": 0x25, "tri6": 0x24, "quad9": 0x23, "quad4": 0x5}
     for number, grid in enumerate(steps):
@@ -138,8 +137,7 @@ def test_what_cannot_be_exported(tmp_path: Path) -> None:
         path = path.rename(tmp_path / name)
         with pytest.raises(FileError, match=rf"XDMF readers cannot open '{name}': use a name in ASCII without colons"):
             write_xdmf(path, tmp_path / "a.xdmf")
-    lines = fc.Mesh(MESH.points, {"line2": MESH.cells["line2"]})
-    write(tmp_path / "lines.vtkhdf", 1, lines)
+    write(tmp_path / "lines.vtkhdf", 1, fc.Mesh(MESH.points, {"line2": MESH.cells["line2"]}))
     with pytest.raises(
         FileError, match=r"XDMF cannot show '.*lines\.vtkhdf' with no solid cells: open the \.vtkhdf file itself"
     ):
@@ -204,8 +202,7 @@ def test_the_numbers_stand_in_the_file_to_the_last_bit(tmp_path: Path) -> None:
 
 def test_values_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
     curve = Curve([0.0, 1.0, np.nan, 3.0, 4.0], [1.0, np.nan, 2.0, np.inf, 5.0], "holes")
-    nothing = Curve([np.nan], [1.0], "nothing")
-    write_agr(tmp_path / "a.agr", [nothing, curve], **LABELS)
+    write_agr(tmp_path / "a.agr", [Curve([np.nan], [1.0], "nothing"), curve], **LABELS)
     text = (tmp_path / "a.agr").read_text("latin-1")
     assert [values.tolist() for values in sets_of(text)] == [[[0.0, 1.0], [4.0, 5.0]]]
     assert "nothing" not in text

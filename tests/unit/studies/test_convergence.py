@@ -230,8 +230,7 @@ def test_corners_of_a_quadratic_mesh_file_make_a_linear_study(on_a_mesh_file):
     mesh = fc.generate.half_spheres("tri6", size=15.0)
     case = read_case(on_a_mesh_file)
     for element, kinds in (("tri3", {"tri3"}), ("tri6", {"tri6"}), (None, {"tri6"})):
-        recipe = levels.recipe(settings(case), element, 1)
-        made = levels.make_mesh(recipe, mesh)
+        made = levels.make_mesh(levels.recipe(settings(case), element, 1), mesh)
         assert set(made.solids) == kinds
         assert len(made.cells[kinds.pop()]) == 4 * len(mesh.cells["tri6"])
 

@@ -67,8 +67,7 @@ def test_heat_makes_a_held_bar_yield(tmp_path):
 
 
 def test_a_held_bar_is_pressed(tmp_path):
-    deck = deck_of(tmp_path, heated(change=HELD))
-    (step,) = deck.solve()
+    (step,) = deck_of(tmp_path, heated(change=HELD)).solve()
     assert step.contact["ss/sm"].force[2] == pytest.approx(200_000 * 1e-5 * 100.0, rel=1e-9)
 
 

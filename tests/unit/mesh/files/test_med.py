@@ -327,8 +327,7 @@ def write_characters(group, text):
     """One zero-terminated character an entry, a type for which h5py has no NumPy type of its own."""
     characters = np.frombuffer(text.encode(), "S1")
     space = h5py.h5s.create_simple(characters.shape)
-    dataset = h5py.h5d.create(group.id, b"NOM", h5py.h5t.C_S1, space)
-    dataset.write(space, space, characters, mtype=h5py.h5t.C_S1)
+    h5py.h5d.create(group.id, b"NOM", h5py.h5t.C_S1, space).write(space, space, characters, mtype=h5py.h5t.C_S1)
 
 
 def write_med_2(path):
@@ -400,8 +399,7 @@ def test_numbers_and_families_may_be_absent(tmp_path):
 
 def add_vertices(path, points, family):
     with h5py.File(path, "a") as file:
-        step = next(iter(file["ENS_MAA/mesh"].values()))
-        entry = step["MAI"].create_group("PO1")
+        entry = next(iter(file["ENS_MAA/mesh"].values()))["MAI"].create_group("PO1")
         for name, data in {"NOD": np.int32(points) + 1, "FAM": np.full(len(points), family, np.int32)}.items():
             entry.create_dataset(name, data=data).attrs["NBR"] = len(points)
 

@@ -400,5 +400,4 @@ def test_groups_survive_a_round_trip_through_pyvista(tmp_path):
     mesh = fc.generate.half_spheres(size=10.0)
     write_mesh(tmp_path / "ours.vtu", mesh)
     pyvista.read(tmp_path / "ours.vtu").save(tmp_path / "theirs.vtu")
-    found = read_mesh(tmp_path / "theirs.vtu")
-    assert_same_mesh(found, mesh)
+    assert_same_mesh(read_mesh(tmp_path / "theirs.vtu"), mesh)
