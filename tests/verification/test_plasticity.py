@@ -234,7 +234,7 @@ def test_a_flat_punch_whose_edge_lies_on_a_node():
     """The node at the edge alternates: loaded it moves outward past the edge, unloaded it returns. The load is Prandtl's."""
     model = punched("plane_strain")
     with pytest.raises(fc.ConvergenceError, match=r"Criteria\(keep_pairing=True\), since nodes move past the edge"):
-        fc.solve(model, 4, criteria=fc.Criteria(max_geometry_updates=15))
+        fc.solve(model, 4, criteria=fc.Criteria(max_geometry_updates=15, max_halvings=1))
     last = fc.solve(model, 4, criteria=fc.Criteria(keep_pairing=True))[-1]
     assert -last.contact["punch"].force[1] == pytest.approx((2.0 + np.pi) * 300.0 / np.sqrt(3.0), rel=0.03)
 
