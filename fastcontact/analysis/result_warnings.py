@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
@@ -482,7 +481,7 @@ def _quadrature_error(
     pressure, options = contact.pressure[contact.pressure > 0.0], pair.options
     if options.cohesion is not None or options.penalty is not None or pair.excluded.any() or not len(pressure):
         return
-    modulus, other = (_modulus(model, side.points) for side in (pair.secondary, pair.primary))
+    modulus, other = (model.contact_modulus_at(side.points) for side in (pair.secondary, pair.primary))
     error = modulus / (modulus + other) * float(np.abs(pair.quadrature_error(configuration, contact.pressure)).max())
     if error > WARNING_ERROR * (mean := float(pressure.mean())):
         yield (
@@ -519,7 +518,7 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
 
     side, group, primary = pair.secondary, pair.secondary.group, pair.primary
     if isinstance(primary, Surface):
-        modulus, other = (_modulus(model, surface.points) for surface in (side, primary))
+        modulus, other = (model.contact_modulus_at(surface.points) for surface in (side, primary))
         if modulus > NOTABLE_MODULUS_RATIO * other:
             return f"exchange the sides, since the body of '{primary.group}' is softer"
     if pair.name != "mortar":
@@ -533,13 +532,6 @@ def _oscillation_remedy(pair: Formulation, model: Model) -> str:
     if length > (1.0 + WARNING_RATIO) * opposite:
         return f"use facets of '{group}' that are at most as large as the opposite ones"
     return f"use smaller facets of both '{group}' and '{primary.group}'"
-
-
-def _modulus(model: Model, points: NDArray[np.integer]) -> float:
-    """Return the mean contact modulus of the cells at `points` [pressure]."""
-    solids = model.mesh.solids
-    moduli = [values[np.isin(solids[name], points).any(axis=1)] for name, values in model.contact_moduli().items()]
-    return float(np.concatenate(moduli).mean())
 
 
 def _pressure_peak_at_edge(

@@ -24,11 +24,13 @@ from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.cohesive_layer import CohesiveLayer
-from fastcontact.contact.conductance import heat_transfer
+from fastcontact.contact.conductance import closed_fractions, heat_transfer
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ConvergenceError
+from fastcontact.model.model import Model
 from fastcontact.model.parts.heat import HEAT_FLUX
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -145,6 +147,11 @@ def _steady_temperatures(heat: Heat, step: StepContext, equilibrium: StepEquilib
         if law is not None:
             h, facing = np.zeros(len(gap)), link.area > 0.0
             h[facing] = law(force[facing] / link.area[facing], gap[facing])
+            is_closed, one_per_node = gap == 0.0, part.nodes is not None and part.tied is None and part.wetted is None
+            if one_per_node and (facing & ~is_closed).any() and is_closed.any() and law.jump:
+                pressure = constraints.nodal_field.pressure(force)
+                closed = _closed_fractions(problem.model, pair, pressure, np.where(facing, gap, np.inf), configuration)
+                h[facing] = np.maximum(h + law.jump * (closed - is_closed), 0.0)[facing]
             obstacle_rise = 0.0
             if pair.options.obstacle_temperature is None:
                 contact_matrix = csr_array(contact_matrix + link.matrix(h))
@@ -164,6 +171,22 @@ def _steady_temperatures(heat: Heat, step: StepContext, equilibrium: StepEquilib
         power = h * link.area * (link.jump @ steady.rise - obstacle_rise)
         fluxes[name], heat_flows[name] = field.side_pressure(power) / area_ratio, float(power.sum())
     return replace(steady, balance={**steady.balance, "contacts": heat_flows}, fluxes=fluxes)
+
+
+def _closed_fractions(
+    model: Model, pair: Formulation, pressure: Array, gap: Array, configuration: Configuration
+) -> Array:
+    """Return the closed fractions (n_nodes,) of the areas of nodes with one constraint each; see `closed_fractions`.
+
+    `pressure` (n_nodes,) are nodal pressures, and `gap` (n_nodes,) gaps, infinite for nodes that face no facet [length].
+    """
+    if pair.weighs_gaps and pair.secondary.order == 2:  # the last closed mean gap may be a facet away from the rim
+        is_open, at_nodes = (gap > 0.0) & np.isfinite(gap), pair.nodal_gap(configuration)[0]
+        near_rim = pair.secondary.extended_adjacency @ is_open.astype(float) > 0.0
+        gap = np.where(near_rim & np.isfinite(gap) & np.isfinite(at_nodes), at_nodes, gap)
+    sides = [side.points for side in (pair.secondary, pair.primary) if isinstance(side, Surface)]
+    modulus = 1.0 / sum(1.0 / model.contact_modulus_at(points) for points in sides)
+    return closed_fractions(pair.secondary, pair.points, pressure, gap, modulus)
 
 
 def _normal_state(

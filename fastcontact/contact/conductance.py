@@ -4,6 +4,9 @@ The heat flow at a constraint is ``h * area * (T_secondary - T_primary)``, where
 functions of the gap of the constraint. The same weights distribute heat flows to the nodes. The shape functions of the mortar
 multiplier sum to one, so that a uniform flux is transmitted exactly between non-matching meshes (Hueber and Wohlmuth,
 2009, section 3).
+
+At the rim of a contact, facets are partly closed. A conductance that drops to zero when the contact opens then applies to the
+closed part of these facets, see `closed_fractions`.
 """
 
 from __future__ import annotations
@@ -19,6 +22,8 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
+from fastcontact.mesh import elements
+from fastcontact.mesh.flat_pieces import flat_pieces
 
 if TYPE_CHECKING:
     from fastcontact.contact.constraints import Constraints
@@ -78,6 +83,12 @@ class Conductance:
             return self._law
         samples = np.concatenate([[0.0], np.logspace(-9, 9, 37)])
         return [self(samples, np.zeros(len(samples))), self(np.zeros(len(samples)), samples)]
+
+    @property
+    def jump(self) -> float:
+        """Amount by which the conductance drops when a contact without pressure opens [power / (area temperature)]."""
+        closed, opened = self(np.zeros(2), np.array([0.0, np.finfo(float).tiny]))
+        return float(closed - opened)
 
     def __call__(self, pressure: Array, gap: Array) -> Array:
         """Return conductances (m,) at pressures (m,) [pressure] and gaps (m,) [length]; a gap of zero means contact.
@@ -157,3 +168,45 @@ def heat_transfer(
     is_facing = np.isfinite(constraints.areas) & (square > 0.0)
     of_secondary = csr_array(weights @ diags_array(on_secondary.astype(float)))
     return HeatTransfer(of_secondary, csr_array(of_secondary - weights), np.where(is_facing, constraints.areas, 0.0))
+
+
+def closed_fractions(side: Surface, points: Array, pressure: Array, gap: Array, modulus: float) -> Array:
+    r"""Return the closed fractions (n_nodes,) of the areas of the secondary nodes, estimated from pressures and gaps [-].
+
+    At the distance s from the rim of a smooth contact, the pressure is :math:`A \sqrt s` inside, and the gap is
+    :math:`4 A s^{3/2} / (3 E^*)` outside (Johnson, 1985, section 4.2), with a constant A. If the rim is halfway between a
+    closed and an open node at the distance h, the function :math:`p - 3 E^* g / (2 h)` of the pressure p and the gap g thus
+    has opposite values at these nodes. Its linear interpolation vanishes at the rim: the closed fraction of a line is the sum
+    of the positive nodal values divided by the sum of the absolute values. The same ratio is used for triangles.
+
+    Parameters
+    ----------
+    side : Surface
+        The secondary side. Quadratic facets are divided into flat lines or triangles between their nodes.
+    points : ndarray (n_points, dim)
+        Coordinates [length].
+    pressure, gap : ndarray (n_nodes,)
+        Nodal pressures [pressure], and nodal gaps, infinite at nodes that have none [length].
+    modulus : float
+        Effective modulus E* of both bodies [pressure].
+    """
+    closed, total = np.zeros((2, len(gap)))
+    for block in side.blocks:
+        local, corners = block.local, elements.get(block.element).n_corners
+        if not np.isfinite(gap[local[:, corners:]]).any():  # no gaps at mid-side nodes
+            local = local[:, :corners]
+        nodes = local[:, flat_pieces(local.shape[1], points.shape[1])].reshape(-1, points.shape[1])
+        nodes = nodes[np.isfinite(gap[nodes]).all(axis=1)]
+        edges = np.diff(points[side.points[nodes]], axis=1)
+        size = np.linalg.det(edges @ edges.transpose(0, 2, 1)) ** (0.5 / edges.shape[1])
+        level = np.maximum(pressure[nodes], 0.0) - 1.5 * modulus * np.maximum(gap[nodes], 0.0) / size[:, None]
+        is_closed, sizes = level >= 0.0, np.abs(level).sum(axis=1)
+        inside = np.maximum(level, 0.0).sum(axis=1)
+        fraction = np.divide(inside, sizes, out=np.ones(len(level)), where=sizes > 0.0)[:, None]
+        count = is_closed.mean(axis=1, keepdims=True)  # share of the closed nodes, which the closed part covers first
+        of_closed = np.minimum(fraction / np.where(count > 0.0, count, 1.0), 1.0)
+        of_open = np.maximum(fraction - count, 0.0) / np.where(count < 1.0, 1.0 - count, 1.0)
+        area, shares = size[:, None] ** edges.shape[1], np.where(is_closed, of_closed, of_open)
+        np.add.at(closed, nodes, area * shares)
+        np.add.at(total, nodes, np.broadcast_to(area, nodes.shape))
+    return np.divide(closed, total, out=(gap == 0.0).astype(float), where=total > 0.0)

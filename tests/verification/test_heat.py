@@ -287,6 +287,41 @@ def test_hot_hertz_contact_passes_conductance_times_force():
     assert step.heat["exchanges"] >= 2
 
 
+@pytest.mark.parametrize(
+    ("kinematics", "element", "options", "size", "mean_error", "largest_error"),
+    [
+        ("plane_strain", "quad4", {"formulation": "node_to_segment"}, 0.125, 0.015, 0.03),
+        ("plane_strain", "tri3", {"formulation": "mortar", "multipliers": "dual"}, 0.125, 0.015, 0.03),
+        ("axisymmetric", "quad8", {"formulation": "mortar", "multipliers": "dual"}, 0.125, 0.02, 0.055),
+        ("axisymmetric", "tri6", {"formulation": "node_to_segment"}, 0.125, 0.02, 0.03),
+        ("3d", "hex8", {"formulation": "node_to_segment"}, 0.25, 0.02, 0.04),
+    ],
+)
+@pytest.mark.filterwarnings("ignore")
+def test_a_constant_conductance_acts_on_the_closed_area(kinematics, element, options, size, mean_error, largest_error):
+    """Below a ball of 0, a block of 1 with a rim in several places within facets; area of Hertz at equal force."""
+    E, R, dim = 1000.0 * (1 - 0.3**2), 40.0, 3 if kinematics == "3d" else 2
+    mesh = fc.generate.graded_block(element, width=8.0, contact_radius=1.25, contact_size=size)
+    model = made_of(mesh, kinematics, fc.LinearElastic(E=E, nu=0.3, conductivity=1e9))
+    supported(model, SYMMETRY_X="x", **({"SYMMETRY_Y": "y"} if dim == 3 else {}), BOTTOM="xy"[: dim - 1])
+    height = np.array([0.9, 1.2]) / R if kinematics == "plane_strain" else np.array([0.64, 1.2]) / R
+    model.prescribe("BOTTOM", **{"xyz"[dim - 1]: 1.0}, ramp=[(0.0, 0.0), (1.0, height[0]), (2.0, height[1])])
+    model.fix_temperature("BOTTOM", 1.0, ramp=[(0.0, 1.0), (2.0, 1.0)])
+    ball = fc.obstacles.Sphere((0.0,) * (dim - 1) + (R,), R)
+    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, conductance=2.0, obstacle_temperature=0.0, **options)
+    errors = []
+    for step in fc.solve(model, np.linspace(1.0, 2.0, 6 if dim == 2 else 3).tolist()):
+        force, closed = step.contact["ball"].normal_force, step.heat["contacts"]["ball"] / 2.0
+        if kinematics == "plane_strain":
+            area = np.sqrt(8.0 * force * R / (np.pi * 1000.0))
+        else:
+            share = 0.25 if dim == 3 else 1.0
+            area = share * np.pi * (0.75 * force / share * R / 1000.0) ** (2 / 3)
+        errors.append(closed / area - 1.0)
+    assert abs(np.mean(errors)) < mean_error
+    assert np.abs(errors).max() < largest_error
+
+
 def test_free_expansion_by_conduction_is_without_stress():
     mesh = fc.generate.block((2.0, 1.0), (4, 2), "quad8")
     law = fc.LinearElastic(E=2e5, nu=0.3, expansion=1e-5, conductivity=40.0)

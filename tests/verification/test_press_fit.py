@@ -12,6 +12,7 @@ import fastcontact as fc
 pytestmark = pytest.mark.each_value
 
 INTERFERENCE = 0.02
+PLANES_3D = {"XMIN": "x", "XMAX": "y", "ZMIN": "z", "ZMAX": "z"}
 SHAFT, HUB = fc.LinearElastic(E=1000.0, nu=0.3), fc.LinearElastic(E=500.0, nu=0.25)
 LAME = fc.analytic.press_fit_cylinders(
     E_inner=1000.0, nu_inner=0.3, E_outer=500.0, nu_outer=0.25,
@@ -75,6 +76,28 @@ def test_pressures_of_clearances_are_those_of_overlapping_meshes(kind, multiplie
     """A clearance is measured along the normals of the surface, of which a node sees the components along its own."""
     _, last = quarter("quad8", 10, 16, "mortar", swap, multipliers=multipliers, **{kind: -INTERFERENCE})
     assert last.contact["fit"].pressure == pytest.approx(LAME.pressure, rel=5e-3)
+
+
+def arc_in_space(name, radii, divisions):
+    box = fc.generate.box((1.0, 1.0, 1.0), divisions, "hex20", name=name)
+    angle, r = 0.5 * np.pi * box.points[:, 0], radii[0] + (radii[1] - radii[0]) * box.points[:, 1]
+    points = np.column_stack([r * np.sin(angle), r * np.cos(angle), 0.5 * box.points[:, 2]])
+    return fc.generate.renamed(box.replace(points=points), lambda group: group if group == name else f"{name}_{group}")
+
+
+@pytest.mark.parametrize("multipliers", ["dual", "standard"])
+def test_pressures_of_clearances_in_space_are_those_of_overlapping_meshes(multipliers):
+    """Facets are projected along their own normals, to which the distance of the sides is inclined."""
+    interference, pressures = 0.1 * INTERFERENCE, []
+    for overlap in (0.0, interference):
+        shaft, hub = arc_in_space("S", (1.0, 2.0 + overlap), (6, 3, 1)), arc_in_space("H", (2.0, 3.0), (8, 3, 1))
+        model = made_of(fc.generate.union(shaft, hub), "3d", {"S": SHAFT, "H": HUB})
+        supported(model, **{f"{body}_{side}": axis for body in "SH" for side, axis in PLANES_3D.items()})
+        options = {"formulation": "mortar", "multipliers": multipliers, "clearance": overlap - interference}
+        model.add_contact("fit", secondary="H_YMIN", primary="S_YMAX", **options)
+        pressures.append(fc.solve(model, 1)[-1].contact["fit"].pressure)
+    assert pressures[0].mean() == pytest.approx(0.1 * LAME.pressure, rel=5e-3)
+    assert pressures[0] == pytest.approx(pressures[1], rel=1.5e-3)
 
 
 @pytest.mark.parametrize("swap", [False, True])

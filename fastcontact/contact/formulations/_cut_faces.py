@@ -212,7 +212,8 @@ def _integrals(
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
     sum_over_pairs = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
     mass_of_facets = (sum_over_pairs @ mass.reshape(-1, k * k)).reshape(-1, k, k)
-    return Coupling(secondary.block, primary.block, pairs, integrals), mass_of_facets, gap_reduction
+    coupling = Coupling(secondary.block, primary.block, pairs, integrals, -secondary.axes[:, 2])
+    return coupling, mass_of_facets, gap_reduction
 
 
 def _centre(element: elements.Element) -> Array:

@@ -28,12 +28,16 @@ class Coupling:
         Numbers of the secondary and the primary facet of each pair, each in its block. A pair may occur several times.
     integrals : ndarray (n, n_nodes, n_primary_nodes)
         Integrals of secondary times primary shape functions over the overlap [area].
+    projection : ndarray (n_facets, dim), optional
+        Unit vectors out of the primary side along which each secondary facet is projected; None if these are the normals of
+        the primary side [-].
     """
 
     secondary: FacetBlock
     primary: FacetBlock
     pairs: Indices
     integrals: Array
+    projection: Array | None = None
 
 
 @record

@@ -303,6 +303,12 @@ class ModelBase(NameSuggestions):
         moduli = np.array([material.contact_modulus for material, _ in self.materials])
         return {name: moduli[rows] for name, rows in self.material_of_cells().items()}
 
+    def contact_modulus_at(self, points: Numbers) -> float:
+        """Return the mean contact modulus of the cells at `points` (m,) [pressure]."""
+        solids, moduli = self.mesh.solids, self.contact_moduli()
+        at_points = [values[np.isin(solids[name], points).any(axis=1)] for name, values in moduli.items()]
+        return float(np.concatenate(at_points).mean())
+
     def _check_material(self, index: int, group: str | None, numbers: Numbers) -> None:
         """Raise ModelError if cells already have another material than number `index`, unless that was assigned to all cells.
 
