@@ -369,7 +369,7 @@ class _FloatingContact:
         return u[bodies.dofs] + shift
 
     def failure(self, text: str, smaller_steps_help: bool = True) -> ConvergenceError:
-        """Return the error with a `text`, or with bodies that tip over, or with the coefficient of friction that is needed."""
+        """Return the error with a `text`, with bodies that tip over, or with the coefficient of friction needed."""
         problem, motions, constraints = self.step.problem, self.bodies.motions, self.constraints
         needed, tipping_bodies = needed_friction(constraints, motions, self.iterate.u, *self.loads), ""
         if needed is not None or not smaller_steps_help:  # loads move the bodies without limit

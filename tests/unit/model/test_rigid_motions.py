@@ -60,5 +60,7 @@ def test_a_tall_block_that_loads_tip_over_is_told(dim, formulation, axis, togeth
     model.add_contact("c", secondary=f"BLOCK_{bottom}", primary=f"BASE_{top}", formulation=formulation, friction=0.9)
     model.add_force(f"BLOCK_{top}", **{up: -1.0}, ramp=None if together else [(0, 0), (0.5, 1), (1, 1)])
     model.add_force(f"BLOCK_{top}", x=0.5, ramp=None if together else [(0, 0), (0.5, 0), (1, 1)])
-    text = rf"^the loads tip bodies over.*\(body 'BLOCK_\w+': rotation about {axis}, which opens the contact\): lower the"
+    text = (
+        rf"^the loads tip bodies over.*\(body 'BLOCK_\w+': rotation about {axis}, which opens the contact\): lower the"
+    )
     refused(fc.ModelError if together else fc.ConvergenceError, text, fc.solve, model, 2)
