@@ -26,9 +26,18 @@ from fastcontact.contact.constraints import Constraints, StackedConstraints, sta
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
+from fastcontact.model.checks import tips_over
 from fastcontact.model.model import gap_changes
 from fastcontact.model.pretension import loose_bolts_remark
-from fastcontact.model.rigid_motions import cone_rows, generalised_forces, grouped_by_body, needed_friction, stopped_at
+from fastcontact.model.rigid_motions import (
+    LARGEST_COEFFICIENT,
+    cone_rows,
+    generalised_forces,
+    grouped_by_body,
+    needed_friction,
+    stopped_at,
+    tipping,
+)
 from fastcontact.round_off import SINGLE_PRECISION, SUM_ROUND_OFF
 
 # A node stays dry after contact has displaced fluid from it this number of times in a load step. At the front of the fluid, a
@@ -359,11 +368,18 @@ class _FloatingContact:
         self.active = self.active | constraints.usable & (gap <= SINGLE_PRECISION * self.loads[1])
         return u[bodies.dofs] + shift
 
-    def failure(self, text: str, **options: bool) -> ConvergenceError:
-        """Return the error with a `text`, or with the coefficient of friction that would be needed."""
-        problem, motions = self.step.problem, self.bodies.motions
-        needed = needed_friction(self.constraints, motions, self.iterate.u, *self.loads)
-        text = text if needed is None else friction_exceeded(*needed, self.constraints.friction)
+    def failure(self, text: str, smaller_steps_help: bool = True) -> ConvergenceError:
+        """Return the error with a `text`, with bodies that tip over, or with the coefficient of friction needed."""
+        problem, motions, constraints = self.step.problem, self.bodies.motions, self.constraints
+        needed, tipping_bodies = needed_friction(constraints, motions, self.iterate.u, *self.loads), ""
+        if needed is not None or not smaller_steps_help:  # loads move the bodies without limit
+            factor = LARGEST_COEFFICIENT / (largest(constraints.friction) or LARGEST_COEFFICIENT)
+            rows, _ = cone_rows(constraints, factor)
+            tipping_bodies = tipping(motions, rows @ motions.displacement, self.loads[0])
+        if tipping_bodies:
+            text, smaller_steps_help = tips_over(tipping_bodies), False
+        elif needed is not None:
+            text = friction_exceeded(*needed, constraints.friction)
         forces = self.step.load.force.reshape(problem.shape)
         text += loose_bolts_remark(problem.model.pretensions, motions.displacement, forces)
-        return ConvergenceError(text, self.iterate.history, **options)
+        return ConvergenceError(text, self.iterate.history, smaller_steps_help=smaller_steps_help)

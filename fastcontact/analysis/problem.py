@@ -172,6 +172,8 @@ class Problem:
     def reference_points(self) -> dict[str, tuple[int, int]]:
         """Numbers of the points with the displacement and the rotation of each supported reference point, by name."""
         mesh, (supported, _) = self.model.mesh, self.model.prescribed()
+        for _, support in self.model.related_supports:
+            supported.ravel()[support.rows.indices] = True
         names = [name for name in mesh.point_groups if name + ROTATION in mesh.point_groups]
         points = {name: (mesh.point(name), mesh.point(name + ROTATION)) for name in names}
         return {name: pair for name, pair in points.items() if supported[list(pair)].any()}

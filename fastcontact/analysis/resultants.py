@@ -427,7 +427,13 @@ def reference_reactions(
     For each supported reference point, `points` contains the numbers of the two points of the mesh that represent its
     displacement and its rotation, see `Problem.reference_points`.
     """
-    nodal = _support_forces(model, model.relations, model.prescribed()[0], reaction, u)[0]
+    supported, at_points = model.prescribed()[0], np.zeros(u.shape, bool)
+    at_points[[number for pair in points.values() for number in pair]] = True
+    related = [r for _, r in model.related_supports if at_points.ravel()[r.rows.indices].all()]  # supports along axes
+    for support in related:
+        supported.ravel()[support.rows.indices] = True
+    relations = [relation for relation in model.relations if not any(relation is support for support in related)]
+    nodal = _support_forces(model, relations, supported, reaction, u)[0]
     return {
         name: {"force": nodal[point].tolist(), "moment": nodal[rotation, : 2 * model.mesh.dim - 3].tolist()}
         for name, (point, rotation) in points.items()

@@ -22,10 +22,15 @@ if TYPE_CHECKING:
     from fastcontact.contact.formulations import Formulation
 
 
-def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
-    """Raise ModelError with the names of bodies and motions if any rigid-body motion is unrestrained."""
+def check_motions(mesh: Mesh, motions: FreeMotions, tipping: str = "") -> None:
+    """Raise ModelError with the names of bodies and motions if any rigid-body motion is unrestrained.
+
+    `tipping` names bodies that the loads tip over.
+    """
     if not len(motions):
         return
+    if tipping:
+        raise ModelError(tips_over(tipping))
     total, hinges = len(motions), ""
     if len(motions.hinges):
         hinges = (
@@ -36,6 +41,14 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
         f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not restrained: {grouped_by_body(motions.names())}. "
         "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"
         f"{hinges}"
+    )
+
+
+def tips_over(motions: str) -> str:
+    """Return the message for bodies that tip over, given with their motions."""
+    return (
+        f"the loads tip bodies over, and there is no equilibrium ({motions}, which opens the contact): lower the loads or "
+        "their lever arms, or add supports or weak springs (add_spring)"
     )
 
 

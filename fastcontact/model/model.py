@@ -234,7 +234,8 @@ class Model(ModelSupports, metaclass=_PublicNames):
         # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
         gaps = gap_changes(self, motions, rigid_motions.LARGEST_FRICTION_FACTOR)
         unstopped = mechanisms(gaps, np.reshape(work, (-1, len(motions))), motions.simple)
-        check_motions(self.mesh, motions.combined(unstopped))
+        tipping_bodies = rigid_motions.tipping(motions, gaps, np.sum(work, axis=0)) if len(work) else ""
+        check_motions(self.mesh, motions.combined(unstopped), tipping_bodies)
 
 
 def gap_changes(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:

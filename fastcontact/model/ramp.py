@@ -242,3 +242,15 @@ def multiplier(table: PartHistory, ramp: Ramp, instant: float) -> float:
 def combined(by_ramp: Mapping[Any, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
     """Return the sum of the arrays in `by_ramp`, each of `shape`, times the multipliers of their histories at `instant`."""
     return sum((multiplier(table, ramp, instant) * values for table, values in by_ramp.items()), np.zeros(shape))
+
+
+def magnitudes(by_ramp: Mapping[PartHistory, Array]) -> Array:
+    """Return bounds (n,) of the magnitude, over all load factors, of the sum of arrays (n,) times their multipliers.
+
+    The multiplier of the analysis, which is unknown, and the sines of rotations count with the magnitude 1.
+    """
+    tables = {table: values for table, values in by_ramp.items() if isinstance(table, tuple)}
+    others = sum((np.abs(values) for table, values in by_ramp.items() if table not in tables), np.zeros(()))
+    instants = {instant for table in tables for instant, _ in table}
+    sums = np.array([sum(table_value(table, t) * values for table, values in tables.items()) for t in instants])
+    return others + np.abs(sums).max(axis=0) if len(sums) else others

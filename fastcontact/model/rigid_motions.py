@@ -45,6 +45,8 @@ EDGES = 8
 NEARLY_SLIDING = 0.9
 # Largest factor by which the coefficients of friction are multiplied to test whether friction can hold a body.
 LARGEST_FRICTION_FACTOR = 100.0
+# Coefficient of friction with which bodies that slide are told from bodies that tip over; real coefficients are smaller.
+LARGEST_COEFFICIENT = 10.0
 # Relative accuracy of the factor by which the coefficients of friction would have to be multiplied.
 FACTOR_ACCURACY = 1e-3
 # Largest number of motions of parts between hinges. A mesh with more motions is defective.
@@ -394,6 +396,26 @@ def mechanisms(gaps: Array, forces: Array, simple: Array) -> Array:
         if np.abs(motion).max() > NO_MOTION:
             return motion[:, None]
     return np.empty((k, 0))
+
+
+def tipping(motions: FreeMotions, gaps: Array, work: Array) -> str:
+    """Return the names of bodies that tip over, with their motions, or an empty string.
+
+    Bodies tip over if the loads press them against contact, but do work in a rotation that opens gaps. Among the motions that
+    close no gap, that with the largest work divided by the sum of the gap changes is named; it keeps an edge closed. `gaps`
+    (m, k) are the changes of the gaps and `work` (k,) the generalised forces of the loads for each of the k motions.
+    """
+    gaps = np.where(np.abs(gaps) > ZERO, gaps, 0.0)
+    total, scale = gaps.sum(axis=0), np.abs(work).max()
+    if not scale or not total.any() or _null_space(gaps).shape[1]:
+        return ""
+    rows, limits = np.vstack([gaps, -total / np.abs(total).max()]), np.r_[np.zeros(len(gaps)), 1.0]
+    no_equality = np.empty((0, len(work)))
+    opening, lifting = (_maximiser(sign * work / scale, rows, limits, no_equality, FAR) for sign in (1.0, -1.0))
+    if min(work @ opening, -work @ lifting) <= NO_MOTION * scale:
+        return ""
+    names = motions.combined(opening[:, None] / np.abs(opening).max()).names()
+    return grouped_by_body(names) if any("rotation" in name for name in names) else ""
 
 
 def least_restrained(motions: FreeMotions, gaps: Array) -> tuple[str, float]:

@@ -106,7 +106,7 @@ MISTAKES = [
     Mistake("a motion that is infinite", lambda: obstacle(motion={"y": np.inf}), fc.ModelError,
             r"the motion .* of obstacle 'plane' must be finite numbers"),
     Mistake("an obstacle both moved and pushed", lambda: obstacle(motion={"y": -1.0}, force={"y": -1.0}), fc.ModelError,
-            r"obstacle 'plane' is both moved and pushed along y: name this component either in its motion or in its force"),
+            r"obstacle 'plane' is both moved and pushed along y: name this component either in its motion or, unless a guide carries it, in its force"),
     Mistake("an obstacle guided along an oblique direction", lambda: obstacle(force={"y": -1.0}, axes=(1.0, 1.0)), fc.ModelError,
             r"'axes' of obstacle 'plane': obstacles are moved, pushed and guided along x or y: give 'motion' or 'force' by "
             r"components, or rotate the points of the mesh such that the guided direction is an axis"),

@@ -356,3 +356,17 @@ def test_mistakes_are_told(method, arguments, words):
     mesh = fc.generate.with_reference_points(two_blocks("quad4"), {"PIN": (1.0, 1.2)})
     model = model_on(mesh.with_groups(points={"SIDE": mesh.points_of("LEFT2")}))
     refused(fc.ModelError, words, getattr(model, method), **arguments)
+
+
+@pytest.mark.parametrize("kind", ["rigid", "distributing"])
+def test_reactions_of_a_reference_point_on_an_inclined_guide(kind):
+    mesh = fc.generate.with_reference_points(fc.generate.block((1.0, 1.0), (2, 2)), {"HUB": (0.5, 1.5)})
+    model = elastic_model(mesh, BOTTOM="xy")
+    model.add_coupling("HUB", "TOP", kind=kind)
+    model.add_force("RIGHT", x=1.0)
+    model.fix("HUB", "y", axes=(0.8, 0.6))  # guided along (0.8, 0.6)
+    step = fc.solve(model, 1)[-1]
+    force = step.reference_reactions["HUB"]["force"]
+    assert force == pytest.approx(fc.support_forces(model, step)["HUB"].tolist(), abs=1e-12)
+    assert np.dot(force, [0.8, 0.6]) == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(force) > 0.1

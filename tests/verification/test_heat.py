@@ -409,6 +409,7 @@ def test_what_cannot_be_is_refused_by_its_name():
     refused(fc.errors.ModelError, "nothing determines the temperature of body 'LOWER'", model.check)
     model = joined(bar(conductivity=1.0), conductance=2.0)
     model.fix_temperature("UPPER_TOP", 1.0)
+    model.fix_temperature("UPPER_TOP_RIGHT", 1.0 + 1e-15)
     model.check()
     model.fix_temperature("UPPER_TOP_LEFT", 2.0)
     refused(fc.errors.ModelError, "prescribe different temperatures at point", model.check)

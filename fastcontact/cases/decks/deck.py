@@ -45,7 +45,9 @@ class Deck:
     model : Model
         Model of the deck. Contact pairs are named ``SECONDARY/PRIMARY``, and groups have the names of the sets and
         surfaces of the deck. Plane models have unit thickness, and supports on local axes or with a limited period are
-        multi-point constraints. Results of `fastcontact.solve` refer to this model, and `finished` converts them.
+        multi-point constraints. Results of `fastcontact.solve` refer to this model: `StepResult.reference_reactions` lacks
+        the forces of these constraints, and `reaction` includes those of couplings. `finished` converts such results to
+        those of `Deck.solve`.
     ramp : Ramp
         Load steps. Step k of the deck ends at load factor k.
     criteria : Criteria

@@ -11,10 +11,11 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, largest
 from fastcontact.cases.decks.blocks import Block, Location, key_of
 from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
+from fastcontact.round_off import ROUND_OFF
 
 Key = TypeVar("Key", bound=Hashable)
 # Duration of a jump, relative to the duration of a step.
@@ -119,6 +120,8 @@ class Histories(Generic[Key]):
         Value in the absence of a load or support of a key without `baseline`.
     time : float
         Total time [time] at the start of the current step.
+    repeated : list
+        Pairs of values that the current step has set for one key, which must be equal but for round-off.
     """
 
     content: Content
@@ -130,15 +133,13 @@ class Histories(Generic[Key]):
     fixed_keys: set[Key] = field(default_factory=set)
     default: float = 0.0
     time: float = 0.0
+    repeated: list[tuple[Value, Value]] = field(default_factory=list)
 
     def set_value(self, key: Key, value: Value) -> None:
-        """Set a value for the current step. Raises CaseError if this step has already set a different value."""
+        """Set a value for the current step, which `advance` compares with a value that this step has already set."""
         earlier = self.step_values.get(key)
         if earlier is not None and earlier[:2] != value[:2]:
-            raise value.location.error(
-                f"{value.value:g} is the second value in this step, after {earlier.value:g} in line "
-                f"{earlier.location.line}: programs interpret this differently, so give one value"
-            )
+            self.repeated.append((earlier, value))
         self.step_values[key] = value
         self.removals.pop(key, None)
         self.fixed_keys.discard(key)
@@ -169,10 +170,11 @@ class Histories(Generic[Key]):
                 self.removals[key] = None
 
     def advance(self, number: int, step: Step) -> None:
-        """Advance to the end of step `number`, counted from 1."""
+        """Advance to the end of step `number`, counted from 1. Raises CaseError if the step sets two different values."""
         start_factor, start_time = float(number - 1), self.time
         self.time += step.period
         current = self.initial | self.step_values if self.initial else self.step_values
+        self._compare_repeated()
         changed: dict[tuple[Any, ...], Track] = {}
         for key in (*current, *self.removals):
             previous, baseline, new = self.tracks.get(key), self.baseline.get(key, self.default), current.get(key)
@@ -194,6 +196,20 @@ class Histories(Generic[Key]):
         for track in continued.keys() - changed.values():
             track.add(_amplitude_points(*continued[track], start_factor, start_time, step.period))
         self.step_values, self.initial, self.removals, self.fixed_keys = {}, {}, {}, set()
+
+    def _compare_repeated(self) -> None:
+        """Raise CaseError if two values of a key differ by more than round-off of the largest value."""
+        if not self.repeated:
+            return
+        values = (*self.initial.values(), *self.step_values.values())
+        round_off = ROUND_OFF * largest(np.array([value.value for value in values]))
+        for earlier, value in self.repeated:
+            if earlier.amplitude != value.amplitude or abs(earlier.value - value.value) > round_off:
+                raise value.location.error(
+                    f"{value.value:.15g} is the second value in this step, after {earlier.value:.15g} in line "
+                    f"{earlier.location.line}: programs interpret this differently, so give one value"
+                )
+        self.repeated = []
 
     def _periods(self, key: Key, new: Value | None, begin: float) -> tuple[Period, ...]:
         """Return the periods of a quantity with the value `new` in the current step, which begins at load factor `begin`.

@@ -33,7 +33,7 @@ from fastcontact.mesh.quality import check_cells
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
-from fastcontact.model.ramp import Harmonic, PartHistory, Table, interpolation_tables
+from fastcontact.model.ramp import Harmonic, PartHistory, Table, interpolation_tables, linear_ramp, multiplier
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Names of groups; None means all solid cells.
@@ -94,6 +94,11 @@ class Support:
             for versine, generator in enumerate(self.rotation.generators):
                 values[Harmonic(ramp, angle, bool(versine))] = arms @ generator[self.component]
         return values
+
+    def last_value(self, point: Array) -> float:
+        """Return the displacement [length] at the end of the history at a position (1, dim); `ramp` counts as 1."""
+        parts = self.by_history(point).items()
+        return sum(u.item() * (1.0 if h == self.ramp else multiplier(h, linear_ramp(1), np.inf)) for h, u in parts)
 
 
 def group_names(groups: Groups) -> tuple[str, ...] | None:

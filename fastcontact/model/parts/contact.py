@@ -320,7 +320,7 @@ class ModelContact(ModelConnections):
         """
         from fastcontact.contact.obstacles.meshed import MeshedSurface
 
-        for option in ("axes", "direction"):
+        for option in ("axes", "direction", "guide"):
             if option in options:
                 axes = " or ".join("xyz"[: self.mesh.dim])
                 raise ModelError(
@@ -387,7 +387,7 @@ class ModelContact(ModelConnections):
             if axis in motion:
                 raise ModelError(
                     f"obstacle '{name}' is both moved and pushed along {'xyz'[axis]}: name this component either in its "
-                    "motion or in its force"
+                    "motion or, unless a guide carries it, in its force"
                 )
         if 0 in forces and self.kinematics == "axisymmetric":
             raise ModelError(f"a force cannot move obstacle '{name}' along the radius x: in axisymmetry give y only")

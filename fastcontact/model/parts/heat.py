@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.loads import Value, evaluated
 from fastcontact.errors import ModelError
@@ -19,6 +19,7 @@ from fastcontact.model.parts.base import Groups, ModelBase, group_names
 from fastcontact.model.periodicity import representatives
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.rigid_motions import body_name
+from fastcontact.round_off import ROUND_OFF
 
 HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
@@ -203,7 +204,8 @@ class ModelHeat(ModelBase):
             rise = evaluated(support.value, self.mesh.points[nodes], support.name) - self.reference_temperature
             nodes = shared_node[nodes]
             repeated = np.flatnonzero(fixed[nodes])
-            for row in repeated[(values[nodes[repeated]] != rise[repeated])][:1]:
+            round_off = ROUND_OFF * max(largest(values), largest(rise))
+            for row in repeated[np.abs(values[nodes[repeated]] - rise[repeated]) > round_off][:1]:
                 earlier_support = supports[support_number[nodes[row]]]
                 groups = f"'{support.group}' and '{earlier_support.group}'"
                 raise ModelError(f"{groups} prescribe different temperatures at point {nodes[row]}")

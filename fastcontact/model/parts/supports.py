@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.elasticity.loads import Value, axis_values, check_points, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
@@ -22,9 +22,9 @@ from fastcontact.errors import ModelError
 from fastcontact.model.contact_pair import rotation_of
 from fastcontact.model.parts.base import Support, displacement_name
 from fastcontact.model.parts.contact import ModelContact
-from fastcontact.model.ramp import History, PartHistory, Table, interpolation_tables, table_of
+from fastcontact.model.ramp import History, PartHistory, Table, interpolation_tables, magnitudes, table_of
 from fastcontact.model.relation_rows import NORMAL, normals_of, rows_along
-from fastcontact.round_off import SINGLE_PRECISION
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
 # Unit vectors or a function that returns them, as for materials. In 2D a single vector also suffices.
@@ -197,20 +197,24 @@ class ModelSupports(ModelContact):
         """Return the mask (n_points, dim) of the prescribed components and their displacements at multiplier 1, by history.
 
         Displacements have the shape (n_points, dim) [length] for each history. Raises ModelError if two supports contradict
-        each other.
+        each other by more than round-off of the largest displacement.
         """
         fixed = np.zeros(self.mesh.points.shape, bool)
         by_ramp: dict[PartHistory, Array] = {}
-        for number, support in enumerate(self.supports):
-            nodes, k = self.mesh.points_of(support.group), support.component
-            histories, is_new = support.by_history(self.mesh.points[nodes]), ~fixed[nodes, k]
-            for history in {**by_ramp, **histories}:
-                total = by_ramp.setdefault(history, np.zeros(self.mesh.points.shape))
-                values = histories.get(history, np.zeros(len(nodes)))
-                rows = np.flatnonzero((total[nodes, k] != values) & ~is_new)
+        groups = [self.mesh.points_of(support.group) for support in self.supports]
+        displacements = [s.by_history(self.mesh.points[nodes]) for s, nodes in zip(self.supports, groups, strict=True)]
+        round_off = ROUND_OFF * max((largest(magnitudes(values)) for values in displacements), default=0.0)
+        for number, (support, nodes, histories) in enumerate(zip(self.supports, groups, displacements, strict=True)):
+            k, repeated = support.component, fixed[nodes, support.component]
+            for history in histories:
+                by_ramp.setdefault(history, np.zeros(self.mesh.points.shape))
+            if repeated.any():
+                differences = {h: (u[nodes, k] - histories.get(h, 0.0))[repeated] for h, u in by_ramp.items()}
+                rows = np.flatnonzero(magnitudes({h: u for h, u in differences.items() if u.any()}) > round_off)
                 if len(rows):
-                    self._raise_contradiction(number, int(nodes[rows[0]]))
-                total[nodes[is_new], k] = values[is_new]
+                    self._raise_contradiction(number, int(nodes[repeated][rows[0]]))
+            for history, values in histories.items():
+                by_ramp[history][nodes[~repeated], k] = values[~repeated]
             fixed[nodes, k] = True
         self._fix_axis(fixed, by_ramp)
         return fixed, by_ramp
@@ -222,11 +226,11 @@ class ModelSupports(ModelContact):
             if first.component == support.component and node in self.mesh.points_of(first.group):
                 break
         position = self.mesh.points[[node]]
-        value, first_value = (float(np.sum(list(s.by_history(position).values()))) for s in (support, first))
-        axis = "xyz"[support.component]
+        value, first_value = (s.last_value(position) for s in (support, first))
+        axis, ramp = "xyz"[support.component], " with another ramp" if value == first_value else ""
         raise ModelError(
-            f"'{support.group}' prescribes {axis} = {value:g} at point {node}, but '{first.group}' "
-            f"prescribes {first_value:g} there{' with another ramp' if value == first_value else ''}: remove one of the two"
+            f"'{support.group}' prescribes {axis} = {value:.15g} at point {node}, but '{first.group}' "
+            f"prescribes {first_value:.15g} there{ramp}: remove one of the two"
             + (f", or give both histories as pairs: {axis}=[(0.5, f), (1.0, g)]" if support.ramp != first.ramp else "")
         )
 

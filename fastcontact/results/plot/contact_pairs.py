@@ -15,6 +15,9 @@ from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
 from fastcontact.results.units import axis_label
 
+# Largest number of contacts in the legend, each with two lines of this height [inch].
+MAX_NAMED, LINE_HEIGHT = 10, 0.18
+
 
 @typed(FastcontactError)
 def contacts(
@@ -22,7 +25,8 @@ def contacts(
 ) -> Axes:
     """Plot the contact pairs that `find_contacts` returns.
 
-    Each pair has a different colour, which is darker on the secondary side than on the primary side.
+    Each pair has a different colour, which is darker on the secondary side than on the primary side. After ten pairs, the
+    colours are repeated, and the legend states the number of further pairs.
 
     Parameters
     ----------
@@ -44,9 +48,13 @@ def contacts(
     """
     mesh = found_contacts.mesh
     width, height = figure_size(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
-    if mesh.dim == 2:  # the legend is beside the axes
-        margin = LETTER_WIDTH * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
+    # The legend is beside the axes.
+    margin = LETTER_WIDTH * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
+    height = max(height, 1.0 + 2 * LINE_HEIGHT * min(len(found_contacts), MAX_NAMED))
+    if mesh.dim == 2:
         width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + margin)
+    else:
+        width += margin
     axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
     if mesh.dim == 2:
         _draw_2d(axes, found_contacts)
@@ -58,8 +66,14 @@ def contacts(
     axes.set(**{f"{axis}label": axis_label(axis, found_contacts.units, "length") for axis in "xyz"[: mesh.dim]})
     axes.set_title("1 contact" if len(found_contacts) == 1 else f"{len(found_contacts)} contacts")
     if len(found_contacts):
-        anchor = (1.02, 1.0) if mesh.dim == 2 else (0.0, 1.0)
-        axes.legend(loc="upper left", bbox_to_anchor=anchor, fontsize="small")
+        others = len(found_contacts) - MAX_NAMED
+        title = f"the first {MAX_NAMED}, and {others} more" if others > 0 else None
+        handles = axes.get_legend_handles_labels()[0][: 2 * MAX_NAMED]
+        options = {"handles": handles, "title": title, "fontsize": "small", "title_fontsize": "small"}
+        if ax is None:  # the box of the axes may be smaller than the legend
+            axes.figure.legend(loc="outside right upper", **options)
+        else:
+            axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), **options)
     return axes if mesh.dim == 2 or ax is not None else lay_out(axes)
 
 

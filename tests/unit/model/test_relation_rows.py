@@ -176,6 +176,30 @@ def test_a_support_that_contradicts_a_normal_one_is_told():
     refused(fc.ModelError, "the displacement normal prescribed on 'BOTTOM' contradicts the supports", last, model)
 
 
+@pytest.mark.parametrize(
+    ("face", "corner"),
+    [
+        ({"x": 0.3}, lambda e: {"x": 0.3 + e}),
+        ({"x": 0.3, "y": 0.0}, lambda e: {"x": 0.3, "y": e}),
+        (
+            {"x": 0.3, "ramp": [(0, 0), (0.3, 1), (1, 2)]},
+            lambda e: {"x": 0.6, "ramp": [(0, 0), (0.3 + e, 0.5), (1, 1)]},
+        ),
+        ({"x": 0.3, "ramp": [(0, 0), (1, 1)]}, lambda e: {"x": [(0.5, 0.15), (1, 0.3 + e)]}),
+        ({"normal": 0.3}, lambda e: {"x": 0.3 + e}),
+        ({"rotation": {"angle": 0.1, "centre": (0, 0)}}, lambda e: {"rotation": {"angle": 0.1, "centre": (0, e)}}),
+    ],
+)
+def test_two_supports_of_a_node_may_differ_by_round_off_alone(face, corner):
+    for excess in (1e-15, 1e-8):
+        model = elastic_model(block(2), LEFT="xy")
+        model.prescribe("RIGHT", **face)
+        model.prescribe("TOP_RIGHT", **corner(excess))
+        if excess < 1e-12:
+            model.check()
+    refused(fc.ModelError, "'TOP_RIGHT' prescribes .*, but 'RIGHT' prescribes|contradicts the supports", model.check)
+
+
 # ----------------------------------------------------------------------------- supports along axes
 def test_a_cosine_that_is_round_off_contradicts_no_support():
     model = elastic_model(block(2))

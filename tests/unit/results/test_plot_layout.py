@@ -164,13 +164,26 @@ def test_profiles_on_the_same_axes_differ_in_colour_and_are_whole():
     assert (ax.get_xlim(), ax.get_title()) == (wide, "both")
 
 
-def test_the_legend_of_contacts_is_whole():
-    parts = [fc.generate.block((15.0, 56.0), (2, 8), origin=(x, 0.0), name=f"BODY {x:g}") for x in (0.0, 15.0)]
-    ax = fc.plot.contacts(fc.find_contacts(fc.generate.union(*parts)))
+@pytest.mark.parametrize(("dim", "bodies"), [(2, 2), (2, 25), (3, 2), (3, 10), (3, 25)])
+def test_the_legend_of_contacts_is_whole_and_hides_nothing(dim, bodies):
+    def body(x):
+        if dim == 2:
+            return fc.generate.block((15.0, 56.0), (2, 8), origin=(x, 0.0), name=f"BODY {x:g}")
+        return fc.generate.renamed(
+            fc.generate.box((15.0, 56.0, 9.0), (2, 2, 2), origin=(x, 0.0, 0.0)), f"BODY {x:g} {{}}".format
+        )
+
+    ax = fc.plot.contacts(fc.find_contacts(fc.generate.union(*(body(15.0 * i) for i in range(bodies)))))
     ax.figure.canvas.draw()
-    for drawn in (ax.get_legend(), ax.yaxis):
-        assert ax.figure.bbox.fully_containsx(drawn.get_tightbbox(ax.figure.canvas.get_renderer()).x0)
-        assert ax.figure.bbox.fully_containsx(drawn.get_tightbbox(ax.figure.canvas.get_renderer()).x1)
+    renderer = ax.figure.canvas.get_renderer()
+    (legend,) = ax.figure.legends
+    for drawn in (legend, ax.yaxis):
+        box = drawn.get_tightbbox(renderer)
+        assert all(map(ax.figure.bbox.fully_containsx, (box.x0, box.x1)))
+        assert all(map(ax.figure.bbox.fully_containsy, (box.y0, box.y1)))
+    assert legend.get_tightbbox(renderer).x0 > ax.get_window_extent(renderer).x1
+    assert len(legend.get_texts()) == 2 * min(bodies - 1, 10)
+    assert legend.get_title().get_text() == ("the first 10, and 14 more" if bodies == 25 else "")
 
 
 def test_pictures_of_contacts_and_modes_show_the_units_of_the_model():

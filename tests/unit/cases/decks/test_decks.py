@@ -63,6 +63,7 @@ def test_two_cubes_are_a_bar(tmp_path):
         ("2, 1., 0., 0.\n", "2, 1., 0., 0.\n1, 5.\n", "1, 5.", "node 1 is defined twice"),
         ("*Static\n", "*Static\n*Cflux\n17, 11, 3.\n", "*Cflux", "needs a step with"),
         ("roof, P, 100.\n", "roof, P, 100.\nroof, P, 50.\n", "roof, P, 50.", "second value in this step"),
+        ("bottom, 3\n", "bottom, 3\nbottom, 3, 3, 1e-9\n", "bottom, 3, 3", "1e-09 is the second value in this step, after 0"),
         ("*Dsload\n", "*Dsload, amplitude=none\n", "*Dsload", "amplitude 'none' is not defined"),
         ("roof, P, 100.\n", "roof, P, 100.\n*Dload\nup, GRAV, 9.81, 0, 0, -1\n", "up, GRAV", r"no \*DENSITY"),
         ("bottom, 3\n", "bottom, 11\n", "bottom, 11", "not within 1 to 6"),
@@ -74,6 +75,11 @@ def test_what_is_wrong_is_told_by_file_line_and_keyword(tmp_path, old, new, begi
     assert old in WHOLE
     line = line_of(WHOLE.replace(old, new), begins)
     refused(fc.CaseError, rf"^deck\.inp, line {line}, \*[A-Z ]+: .*{said}", deck_of, tmp_path, WHOLE.replace(old, new))
+
+
+def test_two_values_of_a_node_may_differ_by_round_off_alone(tmp_path):
+    text = WHOLE.replace("bottom, 3\n", "bottom, 3, 3, 0.3\nbottom, 3, 3, 0.30000000000000004\n")
+    assert deck_of(tmp_path, text).solve()[-1].displacement[:, 2].max() == pytest.approx(0.3, rel=1e-12)
 
 
 def test_a_deck_without_steps_says_so(tmp_path):
