@@ -295,9 +295,9 @@ def parameter_sweep(
         solved in 20 equal steps, or the result of `solve`.
     parameters : mapping of str to sequence, or sequence
         Values of each parameter, by name. The parameters of a function are its arguments; a sequence alone contains values
-        of the first argument. A parameter of a case is the path of a number in the case file, such as
-        ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.size"``, where tables in a list are numbered from 0. It
-        can also be a name in ``[study.parameters]``, which sets several linked values.
+        of the first argument. A parameter of a case is the path of a number or a string in the case file, such as
+        ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.element"``, where tables in a list are numbered from 0.
+        It can also be a name in ``[study.parameters]``, which sets several linked values.
     quantities : sequence of str, or dict of str to callable
         Further quantities, described for `convergence_study`.
     element, formulation : str, optional
@@ -316,7 +316,8 @@ def parameter_sweep(
     Raises
     ------
     CaseError, FastcontactError
-        If the case, a parameter or a value is invalid, or if the model could not be solved for any combination.
+        If the case, a parameter or a value is invalid, if the runs do not read a parameter, for example because ``[study]``
+        replaces it, or if the model could not be solved for any combination.
 
     Examples
     --------
