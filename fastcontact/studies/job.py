@@ -43,7 +43,9 @@ COMMON_KEYS = {
     *("file", "group", "flip", "crease"),
 }
 # Version of the results in a store, incremented when the quantities or their form change.
-SCHEMA = 6
+SCHEMA = 7
+# Tables and keys of a case file that do not change the result of a run; meshes are those of its recipe.
+UNREAD_TABLES = ("title", "units", "check", "sensitivity", "modes")
 # A function of the last step, or of the list of all steps if its argument has the name `STEPS_ARGUMENT`.
 Measure = Callable[..., float]
 # Names of quantities, or functions by the name of their quantity.
@@ -89,6 +91,7 @@ class Run:
             "seconds": time.perf_counter() - started,
             "warnings": texts,
             "units": dict(last.units),
+            "pairs": list(dict.fromkeys((*filter(None, [pair]), *last.contact))),
         }
 
     @property
@@ -105,15 +108,23 @@ class Job(Run):
     recipe: Recipe  # recipe of the mesh
     base: Mesh | None  # mesh of the case, if it is read from a file
     folder: Path = Path()  # folder to which file names in the case are relative
+    substituted: dict[str, Any] = field(default_factory=dict)  # case before the settings of the study were applied
+    formulation: str | None = None  # formulation of all contact pairs that the settings select
 
     @cached_property  # the contents of the files are hashed once, at the start of a study
     def key(self) -> str:
         """Hash of all inputs of the run: the case, its mesh, the contents of the files in the case, and the version."""
-        data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
-        inputs = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
-        inputs["files"] = digest(referenced_files({key: data[key] for key in data if key != "mesh"}, self.folder))
+        inputs = {"version": __version__, "schema": SCHEMA, **self.inputs}
+        inputs["files"] = digest(referenced_files(self.inputs["data"], self.folder))
         inputs["mesh"] = None if self.base is None else digest_of_mesh(self.base)
         return hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode()).hexdigest()[:32]
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """All inputs of the run, except for the mesh `base` and the contents of files."""
+        data = {key: value for key, value in self.data.items() if key not in ("mesh", *UNREAD_TABLES)}
+        data["theory"] = {pair: theory for pair, theory in data.get("theory", {}).items() if pair == self.pair}
+        return {"data": data, "pair": self.pair, "recipe": self.recipe}
 
     def solve_run(self) -> tuple[Case, list[StepResult]]:
         """See `Run`."""
@@ -195,7 +206,10 @@ def job_of(case: Case, setup: Settings, combination: Combination, level: int, **
     """
     data, mesh = case_data(setup, combination), recipe(setup, combination.element, level)
     base = case.mesh if setup.generator is None else None
-    return Job(name=case.name, data=data, pair=setup.pair, recipe=mesh, base=base, folder=case.folder, **fields)
+    return Job(
+        name=case.name, data=data, pair=setup.pair, recipe=mesh, base=base, substituted=setup.data,
+        formulation=combination.formulation, folder=case.folder, **fields,
+    )  # fmt: skip
 
 
 def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:

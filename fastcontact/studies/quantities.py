@@ -35,6 +35,8 @@ LABELS = {
 }
 # Quantities of a contact pair that are midpoints of bounds, which are usually positions of nodes.
 BRACKETS = ("radius", "stick_radius")
+# Name of the force of a pretension section, which follows the name of the section.
+BOLT_FORCE = "pretension_force"
 # Standard quantities that are relative errors.
 RATIOS = tuple(name for name, (_, kind) in LABELS.items() if not kind)
 
@@ -48,12 +50,18 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     for name in _probe_and_pair_names(case):
         if np.isfinite(value := quantity_value(name, last, case.probes)):
             quantities[name] = value
-    return quantities
+    return quantities | bolt_forces(last)
+
+
+def bolt_forces(last: StepResult) -> dict[str, float]:
+    """Return the force of each pretension section in a step, as the quantity ``"NAME.pretension_force"``."""
+    return {f"{name}.{BOLT_FORCE}": float(section["force"]) for name, section in last.pretension.items()}
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
     """Raise CaseError if a name is not that of a quantity that `measure` may return for the case."""
-    known = [*LABELS, *_probe_and_pair_names(case)]
+    bolts = [f"{section.label}.{BOLT_FORCE}" for section in case.model.pretensions]
+    known = [*LABELS, *_probe_and_pair_names(case), *bolts]
     for name in names:
         if name not in known:
             text = unknown("quantity", name, known)
@@ -78,12 +86,12 @@ def _probe_and_pair_names(case: Case) -> list[str]:
 
 
 def quantities_of_contacts(last: StepResult) -> dict[str, float]:
-    """Return the quantities of the first contact pair of a step that can be evaluated without its model.
+    """Return the quantities of the first contact pair and of bolts in a step that can be evaluated without its model.
 
-    They may be NaN if the pair is open, and the dictionary is empty if there is no pair.
+    Those of the pair may be NaN if it is open.
     """
     contact = next(iter(last.contact.values()), None)
-    return {} if contact is None else _pressure_quantities(contact)
+    return ({} if contact is None else _pressure_quantities(contact)) | bolt_forces(last)
 
 
 def _pressure_quantities(contact: ContactResult, share: float = 1.0) -> dict[str, float]:
@@ -338,7 +346,7 @@ def _kind(quantity: str) -> str | None:
     """Return the kind of unit of a quantity, such as length or force, an empty string for ratios, or None if unknown."""
     if quantity in LABELS:
         return LABELS[quantity][1]
-    return kind_of_unit(quantity)
+    return "force" if quantity.endswith(f".{BOLT_FORCE}") else kind_of_unit(quantity)
 
 
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:

@@ -42,6 +42,7 @@ from fastcontact.studies.settings import (
     settings,
 )
 from fastcontact.studies.sweep_report import Sweep, abscissa_of, label_of
+from fastcontact.studies.swept_keys import Choice, check_swept_keys
 
 
 @typed(CaseError)
@@ -294,9 +295,9 @@ def parameter_sweep(
         solved in 20 equal steps, or the result of `solve`.
     parameters : mapping of str to sequence, or sequence
         Values of each parameter, by name. The parameters of a function are its arguments; a sequence alone contains values
-        of the first argument. A parameter of a case is the path of a number in the case file, such as
-        ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.size"``, where tables in a list are numbered from 0. It
-        can also be a name in ``[study.parameters]``, which sets several linked values.
+        of the first argument. A parameter of a case is the path of a number or a string in the case file, such as
+        ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.element"``, where tables in a list are numbered from 0.
+        It can also be a name in ``[study.parameters]``, which sets several linked values.
     quantities : sequence of str, or dict of str to callable
         Further quantities, described for `convergence_study`.
     element, formulation : str, optional
@@ -315,7 +316,8 @@ def parameter_sweep(
     Raises
     ------
     CaseError, FastcontactError
-        If the case, a parameter or a value is invalid, or if the model could not be solved for any combination.
+        If the case, a parameter or a value is invalid, if the runs do not read a parameter, for example because ``[study]``
+        replaces it, or if the model could not be solved for any combination.
 
     Examples
     --------
@@ -345,14 +347,16 @@ def parameter_sweep(
     choices = _choices(parameters)
     names = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
     check_names(case, names)
-    jobs = [_job(case, choice, element, formulation, level) for choice in choices]
+    job_of_choice = partial(_job, case, element=element, formulation=formulation, level=level)
+    jobs = [job_of_choice(choice) for choice in choices]
+    check_swept_keys(choices, jobs, partial(job_of_choice, sized=False), data_of(case))
     # The first case is built in advance, because an invalid key would make every run fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
     results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
         **report_fields(case),
         **_sweep_fields(parameters, choices, results),
-        combination=str(jobs[0].marks["combination"]),
+        combination="; ".join(dict.fromkeys(str(job.marks["combination"]) for job in jobs)),
         theories=_theory_curves(case, parameters, jobs[0].pair),
         asked=names,
         compared="at equal approach" if jobs[0].pair in case.approach else "",
@@ -376,6 +380,8 @@ def _sweep_of_function(
     ]
     results = run_functions(runs, "no point of the sweep could be solved", **options)
     points = _sweep_fields(values, choices, results)
+    if not measures.keys().isdisjoint(LABELS):  # functions may evaluate other pairs
+        points["pairs"] = ()
     return Sweep(**function_fields(function, results), **points, combination=name, asked=tuple(quantities), compared="")
 
 
@@ -396,6 +402,7 @@ def _sweep_fields(
         "parameters": {name: tuple(values) for name, values in parameters.items()},
         "points": [Point(parameters=choice, **fields_of(Point, r)) for choice, r in runs if "error" not in r],
         "failed": [(choice, str(result["error"])) for choice, result in runs if "error" in result],
+        "pairs": next((tuple(result["pairs"]) for result in results if "pairs" in result), ()),
     }
 
 
@@ -429,13 +436,16 @@ def _theory_at(data: dict[str, Any], pair: str | None) -> dict[str, float]:
     return theory_quantities(theories.get("theory"), theories.get("share", 1.0))
 
 
-def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
-    """Return the job that solves a case for one choice of parameter values."""
+def _job(
+    case: Case, choice: Choice, *, element: str | None, formulation: str | None, level: int | None, sized: bool = True
+) -> Job:
+    """Return the job that solves a case for one choice of parameter values; if it is not `sized`, its size is 0."""
     setup = settings(case, substitute(data_of(case), choice))
     combination = matching_combination(setup, element, formulation)
     level = (DEFAULT_LEVEL if setup.by_shape else 0) if level is None else level
     # Runs with the largest meshes start first, according to the number of points on level 0.
-    size = make_mesh(recipe(setup, combination.element, 0), None).n_points if setup.generator is not None else 0
+    sized = sized and setup.generator is not None
+    size = make_mesh(recipe(setup, combination.element, 0), None).n_points if sized else 0
     marks = {**choice, "combination": f"{combination}, level {level}"}
     return job_of(case, setup, combination, level, label=label_of(choice), marks=marks, size=size)
 

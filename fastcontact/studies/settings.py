@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fastcontact.cases.case import Case
-from fastcontact.cases.keys import check_keys
+from fastcontact.cases.keys import call_with_keys, check_keys
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, check_known
 from fastcontact.mesh import elements
@@ -91,10 +91,18 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     data = data_of(case) if data is None else data
     study = data.get("study", {})
     pair = study.get("contact") or next((contact_pair.name for contact_pair in case.model.contact), None)
-    formulations = {pair.name: pair.formulation for pair in case.model.contact}
+    contact = data.get("contact", {})
+    tables = {**(contact if isinstance(contact, dict) else {}), **data.get("obstacle", {})}
+    formulations = {
+        pair.name: str(tables.get(pair.name, {}).get("formulation", pair.formulation)).replace("-", "_")
+        for pair in case.model.contact
+    }
     if pair is not None:
         check_known("contact pair in study.contact", pair, formulations, CaseError)
     solids = list(case.mesh.solids)
+    if "generator" in data["mesh"] and "element" in data["mesh"]:  # a sweep may change it
+        solids = [data["mesh"]["element"]]
+        check_known("element in mesh.element", solids[0], elements.ELEMENTS, CaseError)
     combination = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
     generator, arguments = _generator(data, study)
     for name in study.get("options", {}):
@@ -323,7 +331,7 @@ def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
     """Return the mesh of a recipe; a recipe without a generator refines the mesh `base`."""
     if "generator" in recipe:
         arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}
-        mesh = GENERATORS[recipe["generator"]](**arguments)
+        mesh = call_with_keys("mesh", GENERATORS[recipe["generator"]], arguments)
         return _refine_repeatedly(mesh, recipe["refinements"], circles(mesh) if recipe["refinements"] else [])
     if base is None:
         raise FastcontactError("the refinement of a mesh needs the initial mesh")

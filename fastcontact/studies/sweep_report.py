@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ import numpy as np
 
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.arrays import AnyArray
-from fastcontact.studies.quantities import column, title
+from fastcontact.studies.quantities import BOLT_FORCE, LABELS, column, title
 from fastcontact.studies.report import Report, Rows, format_axes, marker, number, panels, percent, show_message, to_rows
 from fastcontact.studies.series import Point, TheoryCurve, Value
 
@@ -95,20 +96,26 @@ class Drawing:
 
         If all values of the quantity are positive, the y axis has the scale of the x axis; otherwise it is linear.
         """
+        theories: dict[bytes, tuple[Any, Any, dict[str, Any]]] = {}  # distinct curves, by their values
         for k, (label, points) in enumerate(self.points_of.items()):
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(self._x(points), y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
-            name = (self.theory_label + self._constant_note(quantity)) if k == 0 else None
-            style = {"label": name, "color": f"C{k}" if self.curve_parameters else "black"}
             curves = (curve for curve in self.sweep.theories if curve.label == label and quantity in curve.values)
-            exact = [point.theory.get(quantity, math.nan) for point in points]
+            exact = np.array([point.theory.get(quantity, math.nan) for point in points])
+            x: Any = self._x(points)
+            style: dict[str, Any] = {"ls": "", "marker": "_", "ms": 9}
             if (curve := next(curves, None)) is not None:
-                ax.plot(curve.x, curve.values[quantity], "--", lw=1.1, **style)
-            elif np.isfinite(exact).any():
-                ax.plot(self._x(points), exact, "_", ms=9, **style)
+                x, exact, style = curve.x, curve.values[quantity], {"ls": "--", "lw": 1.1}
+            if np.isfinite(exact).any():
+                shared = exact.tobytes() in theories or not self.curve_parameters
+                theories[exact.tobytes()] = x, exact, {**style, "color": "black" if shared else f"C{k}"}
+        name = self.theory_label + self._constant_note(quantity)
+        for k, (x, exact, style) in enumerate(theories.values()):
+            ax.plot(x, exact, label=name if k == 0 else None, **style)
         positive = all(point.values.get(quantity, 1.0) > 0 for point in self.sweep.points)
         scale = self.scale if positive else "linear"
-        self._format(ax, title(quantity), column(title(quantity), quantity, self.sweep.units), scale)
+        label = column(title(quantity), quantity, self.sweep.units)
+        self._format(ax, self.sweep.with_pair(title(quantity), quantity), label, scale)
 
     def _x(self, points: Sequence[Point]) -> list[Any]:
         """Return the values of the parameter on the x axis, as strings if one of them is a string."""
@@ -116,11 +123,9 @@ class Drawing:
         return list(map(str, x)) if any(isinstance(value, str) for value in x) else x
 
     def _constant_note(self, quantity: str) -> str:
-        """Return a note if the theory does not depend on the parameter, and otherwise an empty string."""
-        curves = self.points_of.values()
-        values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
-        constant = all(len(entries) == 1 for entries in values) and any(len(points) > 1 for points in curves)
-        return f"\n(the same for every {self.abscissa})" if constant else ""
+        """Return a note on parameters on which the theory of a quantity does not depend, or an empty string."""
+        names = self.sweep.constant_in(quantity)
+        return f"\n(the same for every {' and '.join(names)})" if names else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
         """Draw the ratios of a quantity to theory, at equal approach and at equal force, against the parameter."""
@@ -137,7 +142,8 @@ class Drawing:
         if not n_lines:
             return show_message(ax, f"no theoretical value of the {title(quantity)}")
         ax.axhline(1.0, color="black", lw=0.8)
-        self._format(ax, f"{title(quantity)}: ratio to theory{self._constant_note(quantity)}", "computed / theory [-]")
+        heading = f"{self.sweep.with_pair(title(quantity), quantity)}: ratio to theory{self._constant_note(quantity)}"
+        self._format(ax, heading, "computed / theory [-]")
 
     def _format(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
         """Set scales, title, labels and legend; the legend is beside the axes if there are several curves."""
@@ -182,6 +188,8 @@ class Sweep(Report):
         another load.
     asked : tuple of str
         Additional quantities of ``[study]`` in tables and figures.
+    pairs : tuple of str
+        Contact pairs; standard quantities such as ``force`` are those of the first.
     """
 
     kind = "Sweep"
@@ -194,6 +202,7 @@ class Sweep(Report):
     theories: tuple[TheoryCurve, ...] = ()
     compared: str = "at equal approach"
     asked: tuple[str, ...] = ()
+    pairs: tuple[str, ...] = ()
 
     @property
     def quantities(self) -> list[str]:
@@ -205,6 +214,8 @@ class Sweep(Report):
         return self.with_metadata({
             "combination": self.combination,
             "parameters": {name: list(values) for name, values in self.parameters.items()},
+            "contact": self.pairs[0] if self.pairs else None,
+            "theory_independent_of": self.theory_independent_of,
             "points": [_point_dict(point) for point in self.points],
             "failed": [{"parameters": choice, "error": text} for choice, text in self.failed],
         })  # fmt: skip
@@ -215,7 +226,8 @@ class Sweep(Report):
         The fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s] and, for each quantity, its value
         [unit of the quantity] and, if known, the relative differences ``..._from_theory``, ``..._from_theory_at_equal_force``
         and ``..._from_reference`` [-]. A result that has the name of a parameter, such as ``force``, is in the field
-        ``computed_force``.
+        ``computed_force``. The field ``theory_independent_of`` contains the parameters that change results but not the theory
+        of the case, if there are any.
 
         If points could not be solved, their results are NaN, and the last field, ``failed``, is the reason; it is empty for
         other points.
@@ -226,6 +238,8 @@ class Sweep(Report):
         rows = [self._row(solved[choice]) if choice in solved else {} for choice in choices]
         names = dict.fromkeys(name for row in rows for name in row)
         columns: dict[str, Sequence[Any]] = {name: [row.get(name, math.nan) for row in rows] for name in names}
+        if names_without_theory := ", ".join(self.theory_independent_of):
+            columns["theory_independent_of"] = [names_without_theory] * len(choices)
         if reasons:
             columns["failed"] = [reasons.get(choice, "") for choice in choices]
         results = {f"computed_{name}" if name in self.parameters else name: values for name, values in columns.items()}
@@ -250,17 +264,53 @@ class Sweep(Report):
         """See `Report`."""
         remarks = self.warnings_of((label_of(point.parameters), point.warnings) for point in self.points)
         remarks += [f"{label_of(choice)} failed: {text}" for choice, text in self.failed]
-        theories = [{point.theory.get(name) for point in self.points} - {None} for name in self._main_quantities()]
-        values = [[point.values.get(name, math.nan) for point in self.points] for name in self._main_quantities()]
-        differ = [
-            np.ptp(computed) > NOTABLE * np.max(np.abs(computed)) for computed in values
-        ]  # False for prescribed forces
-        if any(len(theory) == 1 and varies for theory, varies in zip(theories, differ, strict=True)):
-            remarks += [
-                "the theory is the same for all points: a name in [study.parameters] can also set keys of "
-                "the theory, such as theory.PAIR.E1"
-            ]
-        return remarks
+        return remarks + [self._constant_theory_remark(name) for name in self.theory_independent_of]
+
+    def constant_in(self, quantity: str) -> list[str]:
+        """Return the parameters with several values on which the theory of a quantity does not depend."""
+        names = [name for name, values in self.parameters.items() if len(set(values)) > 1]
+        sets = {name: [{p.theory.get(quantity) for p in points} for points in self._groups(name)] for name in names}
+        return [name for name in names if sets[name] and all(len(v) == 1 and None not in v for v in sets[name])]
+
+    def _groups(self, parameter: str) -> list[list[Point]]:
+        """Return the points in groups of several points that differ in a parameter only."""
+        groups: dict[str, list[Point]] = {}
+        for point in self.points:
+            others = [name for name in point.parameters if name != parameter]
+            groups.setdefault(label_of(point.parameters, others), []).append(point)
+        return [points for points in groups.values() if len(points) > 1]
+
+    @property
+    def theory_independent_of(self) -> list[str]:
+        """Parameters that change a main quantity by more than one per cent, but not its theory."""
+        found = dict.fromkeys(
+            name
+            for quantity in self._main_quantities()
+            for name in self.constant_in(quantity)
+            if any(_differ([p.values.get(quantity, math.nan) for p in points]) for points in self._groups(name))
+        )
+        return [name for name in self.parameters if name in found]
+
+    def _constant_theory_remark(self, parameter: str) -> str:
+        """Return the remark that the theory does not depend on a parameter, and how it can be made to."""
+        remark = f"the theory does not depend on {parameter}"
+        if any(isinstance(value, (str, bool)) for value in self.parameters[parameter]):
+            return remark
+        case, pair = tomllib.loads(self.text), self.pairs[0]
+        linked = case.get("study", {}).get("parameters", {}).get(parameter)
+        names = {path.rpartition(".")[2] for path in linked or (parameter,)}
+        keys = [key for key in case["theory"][pair] if key.rstrip("0123456789") in names] or ["KEY"]
+        entries = ", ".join(f'"theory.{pair}.{key}" = "value"' for key in keys)
+        if linked:
+            return f"{remark}: if it should, add {entries} to [study.parameters.{parameter}]"
+        entries = f'"{parameter}" = "value", {entries}'
+        return f"{remark}: if it should, sweep NAME of a table [study.parameters.NAME] with {entries}"
+
+    def with_pair(self, label: str, quantity: str) -> str:
+        """Return a label of a quantity, with the name of its contact pair if there are several pairs."""
+        of_pair = len(self.pairs) > 1 and "study.contact" not in self.parameters
+        of_pair = of_pair and quantity in LABELS and quantity != "von_mises_max"
+        return f"{label} of '{self.pairs[0]}'" if of_pair else label
 
     def figure(self) -> Any:
         """Return a Matplotlib figure with the values against a parameter and their ratios to theory.
@@ -284,8 +334,12 @@ class Sweep(Report):
         return axes[0, 0].figure
 
     def _main_quantities(self) -> list[str]:
-        """Return the names of the standard and the requested quantities that were evaluated, or of the first three others."""
-        names = dict.fromkeys((*STANDARD, *self.asked))
+        """Return the names of the main quantities that were evaluated, or of the first three others.
+
+        The main quantities are the standard and the requested ones, and forces of pretension sections.
+        """
+        bolts = [name for name in self.quantities if name.endswith(f".{BOLT_FORCE}")]
+        names = dict.fromkeys((*STANDARD, *bolts, *self.asked))
         return [name for name in names if name in self.quantities] or self.quantities[:3]
 
     def tables(self) -> list[tuple[str, Rows]]:
@@ -300,10 +354,15 @@ class Sweep(Report):
             if any(name in point.theory for point in self.points):
                 differences = {"theory": "from theory"} | ({"equal_force": "at equal force"} if name != "force" else {})
             values = [number(point.values.get(name, math.nan), 7) for point in self.points]
-            columns.append((column(name, name, self.units), values))
+            columns.append((column(self.with_pair(name, name), name, self.units), values))
             for comparison, label in differences.items():
                 columns.append((label, [percent(point.ratio(name, comparison) - 1.0) for point in self.points]))
         return [(self.combination if self.combination != self.title else "", to_rows(columns))]
+
+
+def _differ(values: Sequence[float]) -> bool:
+    """Return whether values differ notably, which prescribed forces do not."""
+    return bool(np.ptp(values) > NOTABLE * np.max(np.abs(values)))
 
 
 def _point_dict(point: Point) -> dict[str, Any]:

@@ -29,6 +29,30 @@ DATA = {
 }
 
 
+def test_columns_name_contacts_and_contain_the_forces_of_bolts(tmp_path):
+    mesh = fc.generate.block((2.0, 1.0), (4, 2))
+    mesh = mesh.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - 0.5) < 1e-9, between=True)
+    fc.write_mesh(tmp_path / "bar.med", mesh)
+    wall = {"secondary": "LEFT", "shape": {"kind": "half_space", "point": [0.0, 0.0], "normal": [1.0, 0.0]}}
+    data = {**DATA, "mesh": {"file": "bar.med"}, "obstacle": {"upper": DATA["obstacle"]["plane"], "wall": wall}}
+    data["pretension"] = [{"name": "bolt", "section": "CUT", "shortening": 0.001}]
+    data["units"] = {"length": "mm", "force": "N", "pressure": "MPa"}
+    theory = {"kind": "hertz_line", "E1": 1000.0, "nu1": 0.3, "R1": 1.0, "force": 1.0}
+    data["theory"] = {"upper": theory, "wall": theory}
+    data["study"] = {"parameters": {"soft": {"material[0].E": "value"}, "other": {"theory.wall.E1": "value"}}}
+    case = build_case(data, name="bolted", folder=tmp_path)
+    sweep = fc.parameter_sweep(case, {"pretension[0].shortening": [0.001, 0.002]}, workers=1)
+    header, *rows = sweep.tables()[0][1]
+    assert "force of 'upper' [N/mm]" in header
+    bolt = fc.solve(case.model, 1)[-1].pretension["bolt"]
+    assert float(rows[0][header.index("bolt.pretension_force [N/mm]")]) == pytest.approx(bolt["force"])
+    assert sweep.as_dict()["contact"] == "upper"
+    soft = fc.parameter_sweep(case, {"soft": [500.0, 1000.0]}, workers=1).remarks()
+    assert any(text.endswith('add "theory.upper.E1" = "value" to [study.parameters.soft]') for text in soft)
+    other = {"other": [500.0, 1000.0]}
+    refused(fc.CaseError, "do not read 'other': they are compared with the", fc.parameter_sweep, case, other, workers=1)
+
+
 def test_a_case_of_data_can_be_studied():
     case = build_case(DATA, name="mine")
     study = fc.convergence_study(case, levels=2, workers=1)

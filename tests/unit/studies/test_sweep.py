@@ -112,9 +112,15 @@ def test_a_theory_that_the_parameter_does_not_change_is_told(case):
     assert "theory at equal approach\n(the same for every material[0].E)" in curves(ax)
     assert (ax.get_xscale(), ax.get_yscale()) == ("linear", "linear")
     turned = fc.parameter_sweep(case, {"approach": (0.4, 0.8), "material[0].E": (1e4, 2e4)}, level=0, workers=1)
-    labels = curves(drawn(turned)["contact force"])
-    assert {"material[0].E = 10000", "material[0].E = 20000", "theory at equal approach"} <= set(labels)
+    lines = drawn(turned)["contact force"].lines
+    name = "theory at equal approach\n(the same for every material[0].E)"
+    # Theories that coincide are one black curve.
+    assert [line.get_label() for line in lines] == ["material[0].E = 10000", "material[0].E = 20000", name]
+    assert lines[-1].get_color() == "black"
     assert len(turned.theories) == 2
+    for sweep in (found, turned):
+        assert set(sweep.table()["theory_independent_of"]) == {"material[0].E"}
+        assert sweep.as_dict()["theory_independent_of"] == ["material[0].E"]
 
 
 def test_where_a_theory_is_not_defined_there_is_no_curve(case):
@@ -154,12 +160,24 @@ def test_parameters_in_words():
     assert parameter_label("ramp.steps", units) == "ramp.steps"
 
 
-def test_values_that_are_no_numbers_have_no_curve(case):
-    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
-    found = fc.parameter_sweep(case, {"contact.hertz.formulation": ("continuous", "mortar")}, level=0, workers=1)
+@pytest.mark.parametrize(
+    ("case", "parameter", "values", "heading"),
+    [
+        ("cylinder-on-block", "contact.line.formulation", ("mortar", "continuous"), "quad4 mortar, level 0; quad4 con"),
+        ("sphere-on-plane", "mesh.element", ("quad8", "tri3"), "quad8 continuous, level 0; tri3 continuous, level 0"),
+        ("forma04c", "strain", ("small", "finite"), "quad8 continuous, level 0"),
+    ],
+)
+def test_values_that_are_no_numbers_have_no_curve(case, parameter, values, heading):
+    found = fc.parameter_sweep(case, {parameter: values}, level=0, workers=1)
     assert found.theories == ()
+    assert found.combination.startswith(heading)
+    assert not any("if it should" in text for text in found.remarks())
+    first, second = (point.values["pressure_max"] for point in found.points)
+    assert abs(first / second - 1.0) > 1e-4
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
     ax = drawn(found)["contact force"]
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["continuous", "mortar"]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == list(values)
 
 
 @pytest.mark.parametrize(
@@ -168,10 +186,42 @@ def test_values_that_are_no_numbers_have_no_curve(case):
         ({}, "at least one parameter"),
         ({"approach": ()}, "at least one value"),
         ({"material[0].F": (1.0,)}, "material.*'E'|unknown key"),
+        ({"material": (1.0,)}, "expected one of approach, kinematics, reference_temperature, strain"),
+        ({"kinematics": ("axisymmetric", "plane_strain")}, "differ in the unit of forces"),
+        ({"study.quadrangles.arc_sizes": (1.0,)}, r"such as study\.quadrangles\.arc_sizes\[0\]"),
+        # Keys that the runs do not read.
+        ({"title": ("a", "b")}, "do not read 'title': it does not change the solution"),
+        ({"check[0].tolerance": (0.1, 0.2)}, "it does not change the solution"),
+        ({"mesh.generator": ("a", "b")}, r"\[study\] defines the meshes .* set study\.generator"),
+        ({"mesh.segments": (4, 5)}, r"set study\.quadrangles\.segments"),
+        ({"mesh.file": ("a",)}, r"set keys of \[study\.quadrangles\]"),
+        ({"mesh.element": ("quad4", "quad9")}, "selects quad8: set 'element'"),
+        ({"ramp.steps": (1, 5)}, r"study\.load_steps' = 1 replaces it: set study\.load_steps"),
+        ({"contact.hertz.formulation": ("mortar", "continuous")}, "selects continuous: set 'formulation'"),
+        ({"contact.hertz.normals": ("facet", "averaged"), "approach": (0.4,)}, None),
+        ({"study.triangles.size": (12.0, 16.0)}, r"their cells are quad8: set keys of \[study\.quadrangles\]"),
+        ({"study.options.node_to_segment.normals": ("facet",)}, "does not apply to quad8 with the formulation 'con"),
+        ({"support[1].y": (-0.2, -0.3), "approach": (0.4,)}, r"do not read 'support\[1\].y': another parameter"),
     ],
 )
 def test_what_is_wrong_is_told_before_anything_runs(case, parameters, words):
+    if words is None:  # the key is read
+        assert len(fc.parameter_sweep(case, parameters, level=0, workers=1).points) == 2
+        return
     refused(fc.CaseError, words, fc.parameter_sweep, case, parameters, workers=1)
+
+
+@pytest.mark.parametrize(
+    ("case", "parameters", "options", "words"),
+    [
+        ("cylinder-on-block", {"mesh.block_size": (50, 100)}, {}, r"value in it, such as mesh\.block_size\[0\]"),
+        ("cylinder-on-block", {"mesh.element": ("quad8",)}, {"element": "quad4"}, "do not read 'mesh.element'"),
+        ("forma04c", {"contact.hertz.normals": ("facet",)}, {"formulation": "node-to-segment"}, "study.options.node"),
+        ("forma04-no-contact", {"mesh.file": ("other.med",)}, {}, "they refine the mesh that the case was read with"),
+    ],
+)
+def test_what_options_and_meshes_replace_is_told(case, parameters, options, words):
+    refused(fc.CaseError, words, fc.parameter_sweep, case, parameters, **options, level=0, workers=1)
 
 
 @pytest.mark.parametrize(
@@ -220,8 +270,16 @@ def test_the_command_says_how_values_are_written(case, text, capsys):
         ("force-driven-sphere", {"material[0].E": [2e4, 3e4]}, True),
         ("force-driven-sphere", {"material[0].E": [2e4, 2.001e4]}, False),
         ("forma04c", {"approach": [0.4, 4.0]}, False),
+        ("forma04c", {"material[0].E": [1e4, 2e4], "approach": [0.4, 2.0]}, True),
     ],
 )
 def test_a_remark_tells_of_a_theory_that_stays(case, values, same):
     sweep = fc.parameter_sweep(case, values, level=0, workers=1)
-    assert any("theory is the same for all points" in text for text in sweep.remarks()) is same
+    name = next(iter(values))
+    assert sweep.theory_independent_of == [name] * same
+    beginning = f"the theory does not depend on {name}: if it should, "
+    told = [text for text in sweep.remarks() if text.startswith(beginning)]
+    assert len(told) == same
+    if name == "material[0].E" and same:
+        assert '"material[0].E" = "value", "theory.' in told[0]
+        assert '.E1" = "value"' in told[0]
