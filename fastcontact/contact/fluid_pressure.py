@@ -38,7 +38,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 # side, such as the back of a plate. Flanks of a curved body, whose normals are perpendicular, are wetted. Without it,
 # `test_the_force_of_a_fluid_does_not_depend_on_the_choice_of_the_secondary_side` fails.
 FACING_AWAY = 0.5
-# Gap, as a fraction of the facet size of the secondary side, and deviation of the cosine between opposite normals from 1, up to
+# Gap, relative to the facet size of the secondary side, and deviation of the cosine between opposite normals from 1, up to
 # which the force on the secondary side acts on the primary side. Forces at a front then balance exactly. The fraction that
 # acts decreases to zero at twice these values, since an abrupt change could make geometry updates alternate. Mean gaps at
 # open nodes near the edge of the contact, where facets are partly closed, may be negative by this fraction of the facet
