@@ -17,7 +17,7 @@ from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import normals
-from fastcontact.contact.surface import by_block
+from fastcontact.contact.surface import Surface, by_block
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -81,6 +81,14 @@ class NodalField(Protocol):
         The result is the product of `side_pressure` and the nodal areas, except at nodes whose areas vanish.
         """
         return self.side_pressure(force) * self.nodal_areas
+
+    def uncovered(self, side: Surface, usable: Mask) -> list[Array]:
+        """Return the fraction (n_facets, n_nodes) of the area of each node where no contact is possible [-].
+
+        `side` is the secondary side; there is an array for each block of its facets. `usable` (m,) are the constraints that
+        can close.
+        """
+        return [np.where(usable[block.local], 0.0, 1.0) for block in side.blocks]
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
         """Return nodal gaps and the node of each constraint.

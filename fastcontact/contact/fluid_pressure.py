@@ -20,7 +20,14 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.integration import facet_measure, fine_rule
-from fastcontact.contact.projection import SMALL_OVERHANG, DeformedSide, closest_of_types, facet_points
+from fastcontact.contact.projection import (
+    SMALL_OVERHANG,
+    DeformedSide,
+    along_line_normals,
+    along_normals,
+    closest_of_types,
+    facet_points,
+)
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of
 from fastcontact.mesh import elements
@@ -31,7 +38,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 # side, such as the back of a plate. Flanks of a curved body, whose normals are perpendicular, are wetted. Without it,
 # `test_the_force_of_a_fluid_does_not_depend_on_the_choice_of_the_secondary_side` fails.
 FACING_AWAY = 0.5
-# Gap, as a fraction of the size of the secondary side, and deviation of the cosine between opposite normals from 1, up to
+# Gap, relative to the facet size of the secondary side, and deviation of the cosine between opposite normals from 1, up to
 # which the force on the secondary side acts on the primary side. Forces at a front then balance exactly. The fraction that
 # acts decreases to zero at twice these values, since an abrupt change could make geometry updates alternate. Mean gaps at
 # open nodes near the edge of the contact, where facets are partly closed, may be negative by this fraction of the facet
@@ -53,37 +60,37 @@ class WettedRegion:
         Matrix whose product with the area vectors at the secondary nodes is minus the nodal forces on this side [force].
     areas : AreaVectors
         Area vectors of the secondary side.
-    primary : WettedFacets, optional
-        The wetted part of the primary side; None for rigid obstacles.
+    facets : tuple of WettedFacets
+        Wetted facets of the primary side, and of the secondary side where no contact is possible.
     """
 
     rows: Mask
     pressure: Array
     nodal_weights: csr_array
     areas: AreaVectors
-    primary: WettedFacets | None = None
+    facets: tuple[WettedFacets, ...]
 
     def force(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length]."""
         force = np.asarray(-(self.nodal_weights @ self.areas.with_derivative(displacement)[0]))
-        return force if self.primary is None else force - self.primary.with_derivative(displacement)[0]
+        return force - sum(part.with_derivative(displacement)[0] for part in self.facets)
 
     def stiffness(self, displacement: Array) -> csr_array:
         """Return the symmetric part (n_dofs, n_dofs) of minus the derivative of `force` [force / length]."""
         dim, derivative = displacement.shape[1], self.areas.with_derivative(displacement)[1]
         K = csr_array(kron(self.nodal_weights, eye_array(dim)) @ derivative)
-        K = K if self.primary is None else csr_array(K + self.primary.with_derivative(displacement)[1])
+        for part in self.facets:
+            K = csr_array(K + part.with_derivative(displacement)[1])
         return csr_array(0.5 * (K + K.T))
 
 
 @record
 class WettedFacets:
-    """Fluid pressure on the primary side.
+    """Fluid pressure that acts on the facets of a side directly, not through contact constraints.
 
     Attributes
     ----------
     side : Surface
-        The primary side.
     axisymmetric : bool
     points : ndarray (n_points, dim)
         Reference coordinates of all points [length].
@@ -110,21 +117,41 @@ class WettedFacets:
         """
         side, current, pressures, nodes = areas.side, areas.points + displacement, list[Array](), list[Indices]()
         carrier_numbers = np.flatnonzero(carriers)
-        tree = KDTree(areas.points[side.points[carrier_numbers]])
+        tree, deformed = KDTree(areas.points[side.points[carrier_numbers]]), DeformedSide(side, current)
+        project = along_normals if current.shape[1] == 3 else along_line_normals
         for block in primary.blocks:
             element, xi = elements.get(block.element), fine_rule(block.element)[0]
             x, shape = current[block.facets], (len(block.facets), len(xi))
             positions = np.einsum("qk,fkd->fqd", element.shape(xi), x).reshape(-1, x.shape[2])
-            foot = closest_of_types(positions, side.node_positions(current))
-            on_side = facet_points(side, foot.facet, foot.xi)
+            # Points opposite the edge between two facets lie beyond both of them, but not beyond averaged normals.
+            start = closest_of_types(positions, side.node_positions(current))
+            facet, foot, overhang, normal = project(positions, deformed, deformed.smooth_normals, start)
+            on_side = facet_points(side, facet, foot)
             vectors = area_vectors(x, element.gradient(xi)).reshape(positions.shape)
-            faces_away = np.einsum("nd,nd->n", vectors, foot.normal) > FACING_AWAY * np.linalg.norm(vectors, axis=1)
-            is_facing = (foot.overhang <= SMALL_OVERHANG) & ~faces_away
+            faces_away = np.einsum("nd,nd->n", vectors, normal) > FACING_AWAY * np.linalg.norm(vectors, axis=1)
+            # Beyond the ends of the side the pressure decreases to zero; if it ended abruptly, pairings could alternate.
+            fraction = np.clip(2.0 - overhang / SMALL_OVERHANG, 0.0, 1.0) * ~faces_away
             at_feet = np.einsum("nk,nk->n", on_side.shape, nodal_pressure[on_side.local])
-            pressures.append(np.where(is_facing, at_feet, 0.0).reshape(shape))
+            pressures.append((fraction * at_feet).reshape(shape))
             reference = np.einsum("nk,nkd->nd", on_side.shape, areas.points[on_side.nodes])
             nodes.append(carrier_numbers[tree.query(reference)[1]].reshape(shape))
         return cls(primary, areas.axisymmetric, areas.points, tuple(pressures), tuple(nodes))
+
+    @classmethod
+    def uncovered(
+        cls, areas: AreaVectors, nodal_pressure: Array, fractions: list[Array], carriers: Mask
+    ) -> WettedFacets:
+        """Return the parts of the secondary side where no contact is possible; for the parameters see `opposite`.
+
+        `fractions` contains the uncovered fraction of the area of each node (n_facets, n_nodes) [-] for each block of facets.
+        """
+        pressures, nodes = list[Array](), list[Indices]()
+        for block, fraction in zip(areas.side.blocks, fractions, strict=True):
+            N = elements.get(block.element).shape(fine_rule(block.element)[0])
+            pressures.append(nodal_pressure[block.local] * fraction @ N.T)
+            nearest = np.where(carriers[block.local][:, None], np.abs(N), -1.0).argmax(axis=2)
+            nodes.append(np.take_along_axis(block.local, nearest, axis=1))
+        return cls(areas.side, areas.axisymmetric, areas.points, tuple(pressures), tuple(nodes))
 
     def by_node(self, displacement: Array, n_nodes: int) -> csr_array:
         """Return minus the nodal forces that each secondary node transmits (n_nodes, n_dofs) [force]."""
@@ -210,6 +237,7 @@ def with_fluid_pressure(
     assert constraints.areas is not None
     side, points = areas.side, areas.points
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
+    facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
     deformation = config.linearisation_point
     linearised_at = np.zeros_like(points) if deformation is None else deformation
     vectors = areas.with_derivative(linearised_at)[0]
@@ -225,29 +253,39 @@ def with_fluid_pressure(
         is_open = nodal_gap > -NARROW * facet_size
         passable = is_open & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
     wetted = connected_nodes(side, source, passable)
-    rows = wetted[node] & constraints.usable
+    # Where no contact is possible, the first row of each node transmits the force.
+    pressure = np.where(wetted, config.fluid_pressure, 0.0)
+    uncovered = constraints.nodal_field.uncovered(side, constraints.usable)
+    first_of_node = np.zeros(len(node), bool)
+    first_of_node[np.unique(node, return_index=True)[1]] = True
+    carriers = np.zeros(len(wetted), bool)
+    for block, fraction in zip(side.blocks, uncovered, strict=True):
+        carriers[block.local[fraction > SINGLE_PRECISION]] = True
+    rows = wetted[node] & (constraints.usable | (first_of_node & carriers[node]))
+    row_areas = np.where(constraints.usable, constraints.areas, facet_size ** (points.shape[1] - 1))
     # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
     # much larger than the side.
     distance_to_zero = size / SINGLE_PRECISION
-    force = np.where(rows, config.fluid_pressure * constraints.areas, 0.0)
+    force = np.where(rows, config.fluid_pressure * row_areas, 0.0)
     force_by_node = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(wetted)))
-    pressure, nodal_force = np.where(wetted, config.fluid_pressure, 0.0), force_by_node.sum(axis=0)
-    facets, transmitted = None, np.ones(len(node))
+    nodal_force = force_by_node.sum(axis=0)
+    facets, transmitted = list[WettedFacets](), np.ones(len(wetted))
+    if (wetted & carriers).any():
+        facets.append(WettedFacets.uncovered(areas, pressure, uncovered, nodal_force > 0.0))
     if primary is not None and (nodal_force > 0.0).any():
         current = points + config.displacement
-        x, relative_gap = current[side.points], np.abs(nodal_gap) / size
-        transmitted = _transmitted_fraction(x, relative_gap, vectors, DeformedSide(primary, current))[node]
-        direct_pressure = constraints.nodal_field.pressure(force * (1.0 - transmitted))
-        paired = np.bincount(node[constraints.usable], minlength=len(wetted)) > 0
-        direct_pressure = np.where(wetted & _unopposed(side, paired), pressure, direct_pressure)
-        facets = WettedFacets.opposite(primary, areas, config.displacement, direct_pressure, nodal_force > 0.0)
-    B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node], transmitted)
-    if facets is not None:
+        x, opposite = current[side.points], primary.node_positions(current)
+        transmitted = _transmitted_fraction(x, nodal_gap, vectors, opposite, facet_size)
+        direct_pressure = pressure * (1.0 - transmitted)
+        facets.append(WettedFacets.opposite(primary, areas, config.displacement, direct_pressure, nodal_force > 0.0))
+    B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node], transmitted[node])
+    if facets:
         per_force = rows / np.where(nodal_force > 0.0, nodal_force, np.inf)[node]
         to_rows = csr_array((per_force, (np.arange(len(node)), node)), shape=force_by_node.shape)
-        B = csr_array(B - to_rows @ facets.by_node(linearised_at, len(wetted)))
+        for part in facets:
+            B = csr_array(B - to_rows @ part.by_node(linearised_at, len(wetted)))
         B.eliminate_zeros()
-    soft = distance_to_zero / (config.fluid_pressure * constraints.areas)
+    soft = distance_to_zero / (config.fluid_pressure * row_areas)
     return replace(
         constraints,
         B=B,
@@ -255,7 +293,7 @@ def with_fluid_pressure(
         softness=np.vstack([np.where(rows, soft, constraints.softness[0]), constraints.softness[1:]]),
         equality=constraints.equality | rows,
         friction=np.where(rows, 0.0, constraints.friction),
-        wetted=WettedRegion(rows, pressure, csr_array(weights.T @ force_by_node), areas, facets),
+        wetted=WettedRegion(rows, pressure, csr_array(weights.T @ force_by_node), areas, tuple(facets)),
     )
 
 
@@ -286,24 +324,17 @@ def _rows_along_area_vectors(
     return with_area_vectors, weights
 
 
-def _transmitted_fraction(x: Array, relative_gap: Array, vectors: Array, primary: DeformedSide) -> Array:
+def _transmitted_fraction(x: Array, gap: Array, vectors: Array, opposite: list[Array], facet_size: float) -> Array:
     """Return the fraction (n_nodes,) of the pressure that is transmitted to the opposite side, one in narrow gaps [-].
 
-    `x` (n_nodes, dim) are the positions of the secondary nodes [length], `relative_gap` (n_nodes,) their gaps over the size
-    of the side [-], and `vectors` (n_nodes, dim) their area vectors [-].
+    `x` (n_nodes, dim) are the positions of the secondary nodes [length], `gap` (n_nodes,) their gaps, infinite if unknown
+    [length], `vectors` (n_nodes, dim) their area vectors [-], `opposite` the positions of the nodes of the primary facets in
+    each block [length], and `facet_size` the mean size of the secondary facets [length].
     """
-    normal = closest_of_types(x, primary.surface.node_positions(primary.coordinates)).normal
-    cosine = -np.einsum("nd,nd->n", vectors, normal) / np.maximum(np.linalg.norm(vectors, axis=1), SINGLE_PRECISION)
-    ratios = relative_gap / NARROW, (1.0 - cosine) / NARROW
+    foot = closest_of_types(x, opposite)
+    cosine = -np.einsum("nd,nd->n", vectors, foot.normal) / np.maximum(np.linalg.norm(vectors, axis=1), SINGLE_PRECISION)
+    ratios = np.minimum(np.abs(gap), foot.distance) / (NARROW * facet_size), (1.0 - cosine) / NARROW
     return np.asarray(np.prod([np.clip(2.0 - ratio, 0.0, 1.0) for ratio in ratios], axis=0))
-
-
-def _unopposed(side: Surface, paired: Mask) -> Mask:
-    """Return the nodes (n_nodes,) without an opposite facet, given which nodes have constraints that can close.
-
-    On quadratic facets, a node may lack constraints although it has an opposite facet.
-    """
-    return np.asarray(~paired if side.order == 1 else side.node_adjacency @ paired == 0.0)
 
 
 def connected_nodes(side: Surface, source: Mask, passable: Mask) -> Mask:

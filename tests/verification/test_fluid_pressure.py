@@ -176,6 +176,56 @@ def test_the_force_of_a_fluid_does_not_depend_on_the_choice_of_the_secondary_sid
         assert forces[0] == pytest.approx(forces[1], abs=error * abs(forces[1][1]))
 
 
+@pytest.mark.filterwarnings("ignore:contact 'seal' is blown open")
+@pytest.mark.parametrize(
+    ("options", "element"),
+    [(options, element) for options in FORMULATIONS[:4] for element in ("quad4", "quad8", "hex8")]
+    + [({}, "hex20"), (CONTINUOUS, "hex20"), (CONTINUOUS, "tet10")],
+)
+def test_fluid_presses_on_the_part_of_the_secondary_side_that_faces_nothing(options, element):
+    """A small block floats over a wide one: the fluid presses on the whole top of the wide block."""
+    solid = element.startswith(("hex", "tet"))
+    bottom, top, axes = ("ZMIN", "ZMAX", "xyz") if solid else ("BOTTOM", "TOP", "xy")
+    generate = fc.generate.box if solid else fc.generate.block
+    depth, divisions = ((1.0,), (2, 1)) if solid else ((), (1,))
+    wide = generate((2.0, *depth, 0.5), (8, *divisions), element, (0.0, *(0.0 for _ in depth), -0.5), name="WIDE")
+    small = generate((0.4, *depth, 0.5), (2, *divisions), element, (0.55, *(0.0 for _ in depth), 0.1), name="SMALL")
+    mesh = fc.generate.union(
+        *(fc.generate.renamed(m, lambda g, n=n: f"{n} {g}") for m, n in ((wide, "W"), (small, "S")))
+    )
+    model = elastic_model(
+        mesh, "3d" if solid else "plane_strain", E=E, nu=0.3, **{f"W {bottom}": axes, f"S {top}": axes}
+    )
+    model.add_contact("seal", secondary=f"W {top}", primary=f"S {bottom}", **options)
+    model.add_fluid_pressure("seal", 2.0, source=f"W {top}")
+    seal = fc.solve(model, 1)[-1].contact["seal"]
+    assert (seal.fluid_pressure == 2.0).all()
+    # The fraction of a quadratic facet that faces the small block is only known at its nodes.
+    exact = element in ("quad4", "hex8") or options.get("formulation") in ("continuous", "node_to_segment")
+    assert seal.force == pytest.approx([0.0] * (len(axes) - 1) + [-4.0], abs=1e-6 if exact else 0.08)
+    assert seal.primary_force_vectors.sum(axis=0)[-1] == pytest.approx(0.8, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "secondary", "primary"),
+    [({}, "SURFACE", "CONT_BLOCK"), (CONTINUOUS, "SURFACE", "CONT_BLOCK"), ({}, "CONT_BLOCK", "SURFACE")],
+)
+def test_fluid_round_a_sphere_presses_on_both_sides(options, secondary, primary):
+    """A quarter of half a sphere on a block, in fluid, which presses on the projections of the surfaces of both."""
+    mesh = fc.generate.sphere_on_block(R=1.0, block_size=(1.6, 0.8), size=0.25, contact_size=0.15, contact_radius=0.3)
+    mesh = mesh.with_facet_group("SURFACE", lambda x: abs(np.linalg.norm(x - [0.0, 1.0, 0.0], axis=1) - 1.0) < 1e-6)
+    mesh = mesh.with_groups(points={"FAR": np.flatnonzero(np.linalg.norm(mesh.points[:, ::2], axis=1) > 0.99)})
+    model = elastic_model(mesh, "3d", E=100.0, nu=0.3, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="xyz")
+    model.prescribe("SPHERE_TOP", x=0.0, y=-0.02, z=0.0, ramp=HELD)
+    model.add_contact("seal", secondary=secondary, primary=primary, **options)
+    model.add_fluid_pressure("seal", 1.5, source="FAR", ramp=((0, 0), (1, 0), (2, 1)))
+    seal = fc.solve(model, fc.Ramp((1.0, 2.0), ((0, 0), (2, 2))))[-1].contact["seal"]
+    forces = [seal.force_vectors.sum(axis=0), seal.primary_force_vectors.sum(axis=0)]
+    on_sphere, on_block = forces if secondary == "SURFACE" else forces[::-1]
+    assert on_sphere == pytest.approx(1.5 * 0.25 * np.pi * np.array([-1.0, 1.0, -1.0]), rel=0.01)
+    assert on_block == pytest.approx([0.0, -1.5 * 1.6**2, 0.0], rel=0.02, abs=0.01)
+
+
 def test_facets_that_two_fluids_press_on_are_told():
     model = elastic_model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_strain", E=1.0, nu=0.3, TOP="xy")
     for name, height in (("near", -0.1), ("far", -0.2)):

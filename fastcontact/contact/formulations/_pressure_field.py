@@ -43,6 +43,7 @@ from fastcontact.contact.integration import nodes_with_area
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.supported_nodes import directions_without_slip, nodes_with_prescribed_gap
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -135,6 +136,18 @@ class PressureField(NodalField):
         areas = self.nodal_areas
         with_area = np.abs(areas) > LENGTH_ROUND_OFF * np.abs(areas).max(initial=0.0)
         return np.divide(self.covered_areas, areas, out=np.ones_like(areas), where=with_area)
+
+    def uncovered(self, side: Surface, usable: Mask) -> list[Array]:
+        """Return the complement of `covered` or, at permanent points, the fraction of unusable ones; see `NodalField`."""
+        if self.has_new_points:
+            return [np.clip(1.0 - self.covered[block.local], 0.0, 1.0) for block in side.blocks]
+        numbers = np.unique(np.vstack([side.all_local, self.facet_nodes]), axis=0, return_inverse=True)[1].ravel()
+        of_facet, of_point = np.split(numbers, [side.n_facets])
+        areas, n = self.projection.areas, int(numbers.max()) + 1
+        total, usable_area = np.bincount(of_point, areas, n), np.bincount(of_point, usable * areas, n)
+        fraction = (1.0 - usable_area / np.where(total > 0.0, total, np.inf))[of_facet]
+        blocks = zip(np.split(fraction, side.offsets[1:-1]), side.blocks, strict=True)
+        return [np.broadcast_to(of_block[:, None], block.local.shape) for of_block, block in blocks]
 
     def nodal_forces(self, force: Array) -> Array:
         """Return the products (n_nodes,) of the field and the covered areas [force]."""
