@@ -75,18 +75,20 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
     )
 
 
-def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> str:
+def friction_exceeded(factor: float, bodies: list[str], coefficients: Array, at_least: bool = False) -> str:
     """Return the message for loads under which friction cannot hold `bodies`.
 
-    To hold the bodies, the friction `coefficients` would have to be `factor` times as large.
+    To hold the bodies, the friction `coefficients` would have to be `factor` times as large, or `at_least` so if the factor
+    is that of the most favourable distribution of the normal forces.
     """
     distinct = np.unique(coefficients[coefficients > 0.0])
     numbers = (factor, 1.0), (factor * distinct[0], distinct[0])  # which the message must distinguish
     digits = next((n for n in range(3, 12) if all(f"{a:.{n}g}" != f"{b:.{n}g}" for a, b in numbers)), 12)
+    bound = "at least" if at_least else "about"
     needed = (
-        f"a coefficient of about {factor * distinct[0]:.{digits}g} where the largest is {distinct[0]:.{digits}g}"
+        f"a coefficient of {bound} {factor * distinct[0]:.{digits}g} where the largest is {distinct[0]:.{digits}g}"
         if np.isclose(distinct[0], distinct[-1])
-        else f"about {factor:.{digits}g} times the coefficients given, which are from {distinct[0]:.3g} to {distinct[-1]:.3g}"
+        else f"{bound} {factor:.{digits}g} times the coefficients given, from {distinct[0]:.3g} to {distinct[-1]:.3g}"
     )
     verb, elastic_remark = "cannot hold", ""
     if factor < 1.0:

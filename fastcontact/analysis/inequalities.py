@@ -30,13 +30,22 @@ from fastcontact.model.checks import tips_over
 from fastcontact.model.model import gap_changes
 from fastcontact.model.pretension import loose_bolts_remark
 from fastcontact.model.rigid_motions import (
+<<<<<<< HEAD
     LARGEST_COEFFICIENT,
+=======
+    FACTOR_ACCURACY,
+>>>>>>> fricmsg
     cone_rows,
     generalised_forces,
     grouped_by_body,
     needed_friction,
+<<<<<<< HEAD
     stopped_at,
     tipping,
+=======
+    sliding_friction,
+    stopped_at,
+>>>>>>> fricmsg
 )
 from fastcontact.round_off import SINGLE_PRECISION, SUM_ROUND_OFF
 
@@ -298,6 +307,12 @@ class _FloatingContact:
         if constraints.tangents and (position_response is not None or in_increments):
             on_soft_springs = self.solve_on_soft_springs(start, in_increments)
             if on_soft_springs.settled:
+                if (sliding := self.sliding(on_soft_springs)) is not None:
+                    # The normal forces depend on the geometry, which has not converged yet.
+                    before = sum(float(forces.pressing.sum()) for forces in step.state.forces.values())
+                    change = abs(float(on_soft_springs.multiplier.sum()) - before)
+                    text = friction_exceeded(*sliding, constraints.friction)
+                    raise self.error(text, smaller_steps_help=change > (sliding[0] - 1.0) * before)
                 start = start + on_soft_springs.u[dofs.springs]
             elif in_increments:
                 return on_soft_springs, self.guess[dofs.active]
@@ -348,6 +363,17 @@ class _FloatingContact:
             iterate.frictional = last_frictional
         return solution
 
+    def sliding(self, solution: Solution) -> tuple[float, list[str]] | None:
+        """Return the result of `sliding_friction` for a solution on soft springs, or None if friction holds the bodies.
+
+        Bodies that friction cannot hold slide until the springs carry the rest of the load. The residual forces of nonlinear
+        bodies are not those of the loads before Newton's method has converged.
+        """
+        if self.step.problem.bodies is not None or not solution.settled:
+            return None
+        sliding = sliding_friction(self.constraints, self.bodies.motions, solution.multiplier, self.loads[0])
+        return None if sliding is None or sliding[0] <= 1.0 + FACTOR_ACCURACY else sliding
+
     def first_position(self) -> Array:
         """Return the first position (k,) of the springs in a load step [length].
 
@@ -368,6 +394,7 @@ class _FloatingContact:
         self.active = self.active | constraints.usable & (gap <= SINGLE_PRECISION * self.loads[1])
         return u[bodies.dofs] + shift
 
+<<<<<<< HEAD
     def failure(self, text: str, smaller_steps_help: bool = True) -> ConvergenceError:
         """Return the error with a `text`, with bodies that tip over, or with the coefficient of friction needed."""
         problem, motions, constraints = self.step.problem, self.bodies.motions, self.constraints
@@ -383,3 +410,22 @@ class _FloatingContact:
         forces = self.step.load.force.reshape(problem.shape)
         text += loose_bolts_remark(problem.model.pretensions, motions.displacement, forces)
         return ConvergenceError(text, self.iterate.history, smaller_steps_help=smaller_steps_help)
+=======
+    def failure(self, text: str, **options: bool) -> ConvergenceError:
+        """Return the error with a `text`, or with the coefficient of friction that would be needed."""
+        needed = needed_friction(self.constraints, self.bodies.motions, self.iterate.u, *self.loads)
+        if needed is not None:
+            sliding = None
+            if not self.step.problem.solver.iterative:
+                sliding = self.sliding(
+                    self.solve_on_soft_springs(self.iterate.u[self.bodies.dofs], in_increments=False)
+                )
+            text = friction_exceeded(*(sliding or needed), self.constraints.friction, at_least=sliding is None)
+        return self.error(text, **options)
+
+    def error(self, text: str, **options: bool) -> ConvergenceError:
+        """Return the error with a `text` and a remark on loose bolts."""
+        problem, forces = self.step.problem, self.step.load.force.reshape(self.step.problem.shape)
+        text += loose_bolts_remark(problem.model.pretensions, self.bodies.motions.displacement, forces)
+        return ConvergenceError(text, self.iterate.history, **options)
+>>>>>>> fricmsg

@@ -247,7 +247,7 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
         yield (
             f"{fraction:.0%} of the work of friction is done at nodes in the load step in which they close, or contact is "
             "lost, where the slip is that of the complete step, not only that in contact: the work of friction is too large "
-            "by up to this part, and the shear at the edge of the contact is inaccurate; errors of pressures are much "
+            "by up to this part, and the shear is inaccurate where contact begins in the step; errors of pressures are "
             f"smaller. If the work or the shear matters, use more load steps{hint}"
         )
 

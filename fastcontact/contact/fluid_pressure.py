@@ -332,7 +332,9 @@ def _transmitted_fraction(x: Array, gap: Array, vectors: Array, opposite: list[A
     each block [length], and `facet_size` the mean size of the secondary facets [length].
     """
     foot = closest_of_types(x, opposite)
-    cosine = -np.einsum("nd,nd->n", vectors, foot.normal) / np.maximum(np.linalg.norm(vectors, axis=1), SINGLE_PRECISION)
+    cosine = -np.einsum("nd,nd->n", vectors, foot.normal) / np.maximum(
+        np.linalg.norm(vectors, axis=1), SINGLE_PRECISION
+    )
     ratios = np.minimum(np.abs(gap), foot.distance) / (NARROW * facet_size), (1.0 - cosine) / NARROW
     return np.asarray(np.prod([np.clip(2.0 - ratio, 0.0, 1.0) for ratio in ratios], axis=0))
 

@@ -20,7 +20,7 @@ from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh, node_at
 from fastcontact.mesh.topology import RigidParts, bodies, rigid_parts
-from fastcontact.round_off import TINY
+from fastcontact.round_off import SINGLE_PRECISION, TINY
 
 MODE_NAMES = {
     "axisymmetric": ("translation along y (the axis)",),
@@ -49,6 +49,10 @@ LARGEST_FRICTION_FACTOR = 100.0
 LARGEST_COEFFICIENT = 10.0
 # Relative accuracy of the factor by which the coefficients of friction would have to be multiplied.
 FACTOR_ACCURACY = 1e-3
+# Change of the gaps of closed constraints below which a motion along curved or inclined facets is regarded as sliding [-].
+NEARLY_TANGENTIAL = 1e-2
+# Largest number of least-squares problems for the motion in which bodies begin to slide.
+REWEIGHTINGS = 200
 # Largest number of motions of parts between hinges. A mesh with more motions is defective.
 MAX_MOTIONS = 1500
 
@@ -511,6 +515,41 @@ def needed_friction(
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if slide(middle).any() else (low, middle)
     return high, list(motions.combined(sliding[:, None]).by_body())
+
+
+def sliding_friction(
+    constraints: Constraints, motions: FreeMotions, normal_forces: Array, work: Array
+) -> tuple[float, list[str]] | None:
+    """Return the multiplier of the coefficients of friction at which rigid bodies begin to slide [-], and the sliding bodies.
+
+    The normal forces (m,) of the constraints are given [force], unlike in `needed_friction`, and only motions that keep the
+    gaps of closed constraints are considered. By the kinematic theorem of limit analysis, the multiplier is the largest ratio
+    of the power of the loads to that of friction, ``f @ y`` to ``sum(mu n |T y|)``. It is found by iteratively reweighted
+    least squares, which increase the ratio. `work` (k,) are the generalised forces of the loads [force]. The result is None
+    if the loads do no work on these motions, or if friction does none.
+    """
+    closed = normal_forces > SINGLE_PRECISION * normal_forces.max(initial=0.0)
+    gaps = (constraints.B @ motions.displacement)[closed | constraints.equality]
+    _, values, right = np.linalg.svd(np.vstack([gaps, np.zeros((len(motions), len(motions)))]), full_matrices=False)
+    tangential = right[values <= NEARLY_TANGENTIAL * np.sqrt(len(gaps))].T
+    loads = (work + motions.displacement.T @ (constraints.B.T @ normal_forces)) @ tangential
+    slips = np.stack([T @ (motions.displacement @ tangential) for T in constraints.tangents])
+    capacity, y, factor = constraints.friction * normal_forces, np.zeros(len(loads)), 0.0
+    slips, capacity = slips[:, capacity > 0.0], capacity[capacity > 0.0]
+    if not capacity.size or np.abs(loads).max(initial=0.0) <= SMALL_MOTION * capacity.sum():
+        return None
+    weights = capacity
+    for _ in range(REWEIGHTINGS):
+        metric = np.einsum("dmi,m,dmj->ij", slips, weights, slips)
+        y = np.linalg.lstsq(metric, loads)[0]
+        length = np.linalg.norm(slips @ y, axis=0)
+        before, factor = factor, float(loads @ y / max(capacity @ length, TINY))
+        if factor <= (1.0 + 0.01 * FACTOR_ACCURACY) * before:
+            break
+        weights = capacity / np.maximum(length, SINGLE_PRECISION * length.max())
+    sliding = motions.combined((tangential @ y)[:, None])
+    weights = np.where(np.abs(sliding.weights) > SMALL_MOTION * np.abs(sliding.weights).max(), sliding.weights, 0.0)
+    return factor, list(replace(sliding, weights=weights).by_body())
 
 
 def _maximiser(objective: Array, gaps: Array, gap: Array, E: Array, bound: float) -> Array:

@@ -612,7 +612,7 @@ class StepResult(NameSuggestions):
           open. In long steps, this part is overestimated.
         - ``penalty_energy``: energy of penalties and cohesive layers, and of the small compliance of pressure fields.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
-        - ``wear_work``: work of contact pressures on the wear depth, by which bodies approach each other.
+        - ``wear_work``: work of contact pressures on the wear depth. Wear may also change the strain energy.
         - ``imbalance``: external work minus the sum of all other energies.
 
         The dict is empty if the result file was written by a version that did not store these values, and in steps that

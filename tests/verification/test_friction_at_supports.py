@@ -1,5 +1,11 @@
 """Friction at supported nodes: present where sides slide, zero where symmetry excludes slip, however supports are stated."""
 
+<<<<<<< HEAD
+=======
+import re
+import warnings
+
+>>>>>>> fricmsg
 import numpy as np
 import pytest
 from models import elastic_model, last_step, supported, united, with_obstacle
@@ -135,6 +141,50 @@ def test_a_push_beyond_friction_is_told_as_such(push, needed):
     told = f"friction cannot hold body .* coefficient of about {needed} where the largest is 0\\.3"
     with pytest.raises(fc.ConvergenceError, match=told):
         fc.solve(pushed(push), [1.0, 2.0])
+
+
+def twisted(friction):
+    """A small box on a larger one, under its weight and a tangential force at one of its sides, which turns it."""
+    boxes = {"A_": ((6.0, 6.0, 2.0), (6, 6, 1), (0, 0, 0)), "B_": ((4.0, 4.0, 2.0), (5, 5, 1), (1, 1, 2))}
+    parts = {name: fc.generate.box(*data[:2], "hex8", data[2], name=name[0]) for name, data in boxes.items()}
+    model = elastic_model(united(**parts), "3d", A_ZMIN="xyz", E=1000.0)
+    model.add_body_force(groups="B", z=-1.0 / 32.0, ramp=[(0, 0), (1, 1), (2, 1)])
+    model.add_traction("B_XMIN", y=0.2 / 8.0, ramp=[(0, 0), (1, 0), (2, 1)])
+    model.add_contact("c", secondary="B_ZMIN", primary="A_ZMAX", friction=friction)
+    return model
+
+
+def test_the_required_friction_is_that_of_the_elastic_pressures():
+    """With other normal forces, rigid bodies could be in equilibrium with a coefficient of 0.255."""
+    told = []
+    for friction in (0.24, 0.32):
+        with pytest.raises(fc.ConvergenceError, match=r"friction cannot hold body 'B' .*about .* where") as caught:
+            fc.solve(twisted(friction), [1.0, 2.0])
+        told.append(float(re.search(r"about ([\d.]+)", str(caught.value))[1]))
+        assert "halved" not in str(caught.value)
+    assert told == pytest.approx(told[:1] * 2, rel=0.03)
+    assert fc.solve(twisted(1.01 * told[1]), [1.0, 2.0])[-1].contact["c"].force[1] == pytest.approx(-0.2, rel=1e-6)
+
+
+def test_rigid_bodies_give_a_bound_of_the_required_friction_with_multigrid():
+    with pytest.raises(fc.ConvergenceError, match=r"coefficient of at least 0\.5 where the largest is 0\.3\b"):
+        fc.solve(pushed(0.5), [1.0, 2.0], linear_solver="amg")
+
+
+def test_a_hub_that_slides_on_its_shaft_is_told_as_such():
+    """The normals are slightly inclined, since the shaft is longer than the hub."""
+    shaft = fc.generate.block((10.0, 100.0), (3, 30), "quad8", (10.0, -30.0), name="SHAFT")
+    hub = fc.generate.block((40.0, 40.0), (5, 12), "quad8", (20.0, 0.0), name="HUB")
+    model = elastic_model(united(S_=shaft, H_=hub), "axisymmetric", E=100e3, S_BOTTOM="y")
+    ramp = [(0, 0), (1, 1), (2, 1)]
+    model.add_contact("fit", secondary="H_LEFT", primary="S_RIGHT", friction=0.15, clearance=-0.03, clearance_ramp=ramp)
+    pressing = fc.solve(model, [1.0])[-1].contact["fit"].normal_force
+    area = np.pi * (60.0**2 - 20.0**2)
+    model.add_traction("H_TOP", y=1.04 * 0.15 * pressing / area, ramp=[(0, 0), (1, 0), (2, 1)])
+    with pytest.raises(
+        fc.ConvergenceError, match=r"friction cannot hold body 'H_HUB' .*of about 0\.15\d where .* is 0\.15\b"
+    ):
+        fc.solve(model, [1.0, 2.0])
 
 
 @pytest.mark.parametrize("angle", [0.2, 0.44, 0.7])

@@ -350,7 +350,9 @@ def test_slip_after_nodes_have_left_is_told():
     model.prescribe("TOP", x=1.0, ramp=[(0, 0), (1, 0), (2, 0.1), (3, 1)])
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, friction=0.2)
-    with pytest.warns(fc.FastcontactWarning, match="of the work of friction is done at nodes"):
+    with pytest.warns(
+        fc.FastcontactWarning, match="friction is done at nodes .* shear is inaccurate where contact begins"
+    ):
         work = fc.solve(model, [1.0, 2.0, 3.0])[-1].work
     assert work["friction_while_touching"] > 0.5 * work["friction_work"]
 
