@@ -30,22 +30,15 @@ from fastcontact.model.checks import tips_over
 from fastcontact.model.model import gap_changes
 from fastcontact.model.pretension import loose_bolts_remark
 from fastcontact.model.rigid_motions import (
-<<<<<<< HEAD
-    LARGEST_COEFFICIENT,
-=======
     FACTOR_ACCURACY,
->>>>>>> fricmsg
+    LARGEST_COEFFICIENT,
     cone_rows,
     generalised_forces,
     grouped_by_body,
     needed_friction,
-<<<<<<< HEAD
-    stopped_at,
-    tipping,
-=======
     sliding_friction,
     stopped_at,
->>>>>>> fricmsg
+    tipping,
 )
 from fastcontact.round_off import SINGLE_PRECISION, SUM_ROUND_OFF
 
@@ -311,8 +304,7 @@ class _FloatingContact:
                     # The normal forces depend on the geometry, which has not converged yet.
                     before = sum(float(forces.pressing.sum()) for forces in step.state.forces.values())
                     change = abs(float(on_soft_springs.multiplier.sum()) - before)
-                    text = friction_exceeded(*sliding, constraints.friction)
-                    raise self.error(text, smaller_steps_help=change > (sliding[0] - 1.0) * before)
+                    raise self.failure("", change > (sliding[0] - 1.0) * before, sliding)
                 start = start + on_soft_springs.u[dofs.springs]
             elif in_increments:
                 return on_soft_springs, self.guess[dofs.active]
@@ -394,11 +386,13 @@ class _FloatingContact:
         self.active = self.active | constraints.usable & (gap <= SINGLE_PRECISION * self.loads[1])
         return u[bodies.dofs] + shift
 
-<<<<<<< HEAD
-    def failure(self, text: str, smaller_steps_help: bool = True) -> ConvergenceError:
+    def failure(
+        self, text: str, smaller_steps_help: bool = True, sliding: tuple[float, list[str]] | None = None
+    ) -> ConvergenceError:
         """Return the error with a `text`, with bodies that tip over, or with the coefficient of friction needed."""
         problem, motions, constraints = self.step.problem, self.bodies.motions, self.constraints
-        needed, tipping_bodies = needed_friction(constraints, motions, self.iterate.u, *self.loads), ""
+        needed = sliding or needed_friction(constraints, motions, self.iterate.u, *self.loads)
+        tipping_bodies = ""
         if needed is not None or not smaller_steps_help:  # loads move the bodies without limit
             factor = LARGEST_COEFFICIENT / (largest(constraints.friction) or LARGEST_COEFFICIENT)
             rows, _ = cone_rows(constraints, factor)
@@ -406,26 +400,10 @@ class _FloatingContact:
         if tipping_bodies:
             text, smaller_steps_help = tips_over(tipping_bodies), False
         elif needed is not None:
-            text = friction_exceeded(*needed, constraints.friction)
+            if sliding is None and not problem.solver.iterative:
+                position = self.iterate.u[self.bodies.dofs]
+                sliding = self.sliding(self.solve_on_soft_springs(position, in_increments=False))
+            text = friction_exceeded(*(sliding or needed), constraints.friction, at_least=sliding is None)
         forces = self.step.load.force.reshape(problem.shape)
         text += loose_bolts_remark(problem.model.pretensions, motions.displacement, forces)
         return ConvergenceError(text, self.iterate.history, smaller_steps_help=smaller_steps_help)
-=======
-    def failure(self, text: str, **options: bool) -> ConvergenceError:
-        """Return the error with a `text`, or with the coefficient of friction that would be needed."""
-        needed = needed_friction(self.constraints, self.bodies.motions, self.iterate.u, *self.loads)
-        if needed is not None:
-            sliding = None
-            if not self.step.problem.solver.iterative:
-                sliding = self.sliding(
-                    self.solve_on_soft_springs(self.iterate.u[self.bodies.dofs], in_increments=False)
-                )
-            text = friction_exceeded(*(sliding or needed), self.constraints.friction, at_least=sliding is None)
-        return self.error(text, **options)
-
-    def error(self, text: str, **options: bool) -> ConvergenceError:
-        """Return the error with a `text` and a remark on loose bolts."""
-        problem, forces = self.step.problem, self.step.load.force.reshape(self.step.problem.shape)
-        text += loose_bolts_remark(problem.model.pretensions, self.bodies.motions.displacement, forces)
-        return ConvergenceError(text, self.iterate.history, **options)
->>>>>>> fricmsg

@@ -1,11 +1,7 @@
 """Friction at supported nodes: present where sides slide, zero where symmetry excludes slip, however supports are stated."""
 
-<<<<<<< HEAD
-=======
 import re
-import warnings
 
->>>>>>> fricmsg
 import numpy as np
 import pytest
 from models import elastic_model, last_step, supported, united, with_obstacle
