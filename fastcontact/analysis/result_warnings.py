@@ -36,7 +36,7 @@ from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.model import Model
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.step import MIN_ELEMENTS_ACROSS_RADIUS, ContactResult, StepResult, coarse_contact_text
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Factor by which load steps are too large for the wear of single facets, above which the coefficient of wear may be wrong.
@@ -44,8 +44,6 @@ LARGEST_STEP_FACTOR = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `pressure_oscillation`. On other
 # facets the limit is ALTERNATING.
 ALTERNATING_ON_LINES = 0.13
-# Smallest number of elements across the radius of a contact that resolves its pressure.
-MIN_FACETS_ACROSS_RADIUS = 4
 # Sliding past periodic ends, relative to the length of facets, above which a warning is given. On a strip with friction 0.3
 # under a uniform pressure, the relative changes of pressures at the ends are 0.03 times this ratio with dual multipliers and
 # 0.7 times with standard multipliers. In press fits they are 1.7 times this ratio with standard multipliers.
@@ -380,17 +378,15 @@ def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> 
 
 def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
-    if pair.options.kind in ALWAYS_CLOSED or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
+    if not _carries_force(pair, contact, state):
         return
     if not contact.active.any():
         if contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
             yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
         return
-    closed = _closed_or_enclosed(contact.active, pair.secondary)
-    count = facets_across_radius(pair.secondary, closed, pair.excluded[pair.secondary.points])
-    if count is not None and count < MIN_FACETS_ACROSS_RADIUS:
-        resolution = f"{count} {'elements' if count > 1 else 'element'} across its radius"
-        needed, remedy = f"its pressure needs {MIN_FACETS_ACROSS_RADIUS} or more", f"refine '{pair.secondary.group}'"
+    count = _elements_across_radius(pair, contact)
+    if count is not None and count < MIN_ELEMENTS_ACROSS_RADIUS:
+        needed, remedy = f"its pressure needs {MIN_ELEMENTS_ACROSS_RADIUS} or more", f"refine '{pair.secondary.group}'"
         if count == 1:
             friction = ", its direction and the work of friction" if pair.friction else " and its direction"
             needed += f", and with fewer than 2 the force{friction} may be inaccurate, too"
@@ -405,7 +401,27 @@ def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> 
                 remedy += (
                     f", with formulation 'mortar', since the integration points let nodes penetrate by {depth:.3g}"
                 )
-        yield f"contact '{contact.name}' has only {resolution}: {needed}; {remedy}"
+        yield f"{coarse_contact_text(contact.name, count)}: {needed}; {remedy}"
+
+
+def coarse_contacts(problem: Problem, state: State, step: StepResult) -> dict[str, int]:
+    """Return the contacts with too few elements across their radius in a step that ended in `state`, with this number."""
+    pairs = ((name, pair, step.contact[name]) for name, pair in problem.pairs.items())
+    in_contact = [(name, p, c) for name, p, c in pairs if c.active.any() and _carries_force(p, c, state)]
+    counts = ((name, _elements_across_radius(pair, contact)) for name, pair, contact in in_contact)
+    return {name: count for name, count in counts if count is not None and count < MIN_ELEMENTS_ACROSS_RADIUS}
+
+
+def _carries_force(pair: Formulation, contact: ContactResult, state: State) -> bool:
+    """Return whether a pair whose sides may separate carries a force."""
+    is_loaded = largest(contact.force_vectors) > SINGLE_PRECISION * state.largest_force
+    return pair.options.kind not in ALWAYS_CLOSED and is_loaded
+
+
+def _elements_across_radius(pair: Formulation, contact: ContactResult) -> int | None:
+    """Return the result of `facets_across_radius` for a pair, in which open nodes between closed ones count as closed."""
+    closed = _closed_or_enclosed(contact.active, pair.secondary)
+    return facets_across_radius(pair.secondary, closed, pair.excluded[pair.secondary.points])
 
 
 def facets_across_radius(side: Surface, closed: Mask, excluded: Mask) -> int | None:
@@ -553,7 +569,7 @@ def _pressure_peak_at_edge(
     plastic, side = last.cell_fields.get("plastic_strain"), pair.secondary
     peak, is_open = int(contact.pressure.argmax()), ~contact.active & ~pair.excluded[side.points]
     near = np.arange(len(is_open)) == peak
-    for _ in range(MIN_FACETS_ACROSS_RADIUS):
+    for _ in range(MIN_ELEMENTS_ACROSS_RADIUS):
         near = side.node_adjacency @ near > 0
     if pair.options.kind in ALWAYS_CLOSED or not (is_open & near).any():
         return
@@ -625,7 +641,7 @@ def _ends_on_rounding(pair: Formulation, closed: Mask, displacement: Array) -> b
         bend = max(bend, largest(in_facet[is_node & used.any(axis=1, keepdims=True)]))
     smooth = np.arccos(SAME_DIRECTION)
     # At the beginning of a rounding, straight facets turn by half as much as at its other nodes.
-    return bool(turn <= smooth and max(turn, bend) > 0.5 * smooth / MIN_FACETS_ACROSS_RADIUS)
+    return bool(turn <= smooth and max(turn, bend) > 0.5 * smooth / MIN_ELEMENTS_ACROSS_RADIUS)
 
 
 def _alternation(side: Surface, values: Array, selected: Mask) -> tuple[Mask, float, Array]:

@@ -14,7 +14,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.interpenetration import Peak
 from fastcontact.analysis.problem import Problem, linear_with_quadratic_cells, prepare
 from fastcontact.analysis.progress import Progress
-from fastcontact.analysis.result_warnings import result_warnings
+from fastcontact.analysis.result_warnings import coarse_contacts, result_warnings
 from fastcontact.analysis.stages import next_stage, stage_of
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear.choice import automatic_choice, check_solver, check_tolerance
@@ -22,7 +22,7 @@ from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, RampLike, ramp_of
-from fastcontact.results.step import StepResult, Steps
+from fastcontact.results.step import StepResult, Steps, coarse_contact_notes
 
 
 @typed(ModelError)
@@ -80,7 +80,8 @@ def solve(
     -----
     FastcontactWarning
         Before the first step about the model, and after the last step about the result. Each warning states a number
-        and is stored in `StepResult.warnings`.
+        and is stored in `StepResult.warnings`. Contacts with too few elements across their radius in earlier steps are
+        only stated there.
 
     Examples
     --------
@@ -202,9 +203,14 @@ def _solved_steps(
         if undetermined is None and report.get("undetermined"):
             undetermined = index, report["undetermined"], report["moved"]
         peaks = _peaks([step], peaks)
-        warnings = result_warnings(problem, state, step, undetermined, peaks) if instant == instants[-1] else []
-        for text in warnings:
-            warn(text)
+        if coarse := coarse_contacts(problem, state, step):
+            step = replace(step, iterations={**step.iterations, "coarse_contacts": coarse})
+        if instant == instants[-1]:
+            warnings = result_warnings(problem, state, step, undetermined, peaks)
+            for text in warnings:
+                warn(text)
+        else:  # a contact that grows from a point begins with few elements: only results of this step are affected
+            warnings = coarse_contact_notes(step.iterations)
         warned = (*model_texts * (index == 1), *warnings)
         yield replace(step, warnings=warned, restart=restart.restart_data(problem, state, case))
         del step  # to free its memory before the next step is computed

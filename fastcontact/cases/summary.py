@@ -235,7 +235,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
             "of the load at the end"
         )
     for name, theory in summary["theory"].items():
-        texts += _theory_lines(name, theory, summary["contact"][name]["extent"])
+        texts += _theory_lines(name, theory, summary["contact"][name])
     texts += map(_sensitivity_line, summary["sensitivities"])
     if "modes" in summary:
         texts += _mode_lines(summary["modes"])
@@ -300,8 +300,8 @@ def _extent_text(extent: str, lower: float | None, upper: float | None, units: M
     return f"{extent} {lower:.4g} to {value_text(upper, units, 'length')}"
 
 
-def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str]:
-    """Return the lines of the deviations of a contact pair from its theory."""
+def _theory_lines(pair: str, theory: Mapping[str, Any], contact: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the lines of the deviations of a contact pair from its theory; those of the radius are of its two bounds."""
     titles = {
         "equal_approach": "theory at equal approach",
         "equal_force": "theory at equal force",
@@ -309,12 +309,14 @@ def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str
     }
     if theory["equal_approach"]["approach"] is None:
         titles["equal_approach"] = "the given theory"
-    formats = {"force": "force {:+.3%}", "pressure_max": "largest pressure {:+.3%}", "radius": f"{extent} {{:+.2%}}"}
-    return [
-        f"  contact '{pair}' against {titles[key]}: "
-        + ", ".join(formats[name].format(x) for name, x in values["deviation"].items() if x is not None)
-        for key, values in theory.items()
-    ]
+    formats = {"force": "force {:+.3%}", "pressure_max": "largest pressure {:+.3%}"}
+    for key, values in theory.items():
+        known = {name: x for name, x in values["deviation"].items() if x is not None}
+        texts = [formats[name].format(x) for name, x in known.items() if name in formats]
+        if "radius" in known:
+            lower, upper = (bound / values["radius"] - 1.0 for bound in contact["radius"])
+            texts.append(f"{contact['extent']} {lower:+.2%} to {upper:+.2%}")
+        yield f"  contact '{pair}' against {titles[key]}: {', '.join(texts)}"
 
 
 def _sensitivity_line(report: Mapping[str, Any]) -> str:

@@ -136,6 +136,7 @@ def _write_steps(
     from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
     from fastcontact.cases.summary import step_entry
+    from fastcontact.results.step import warnings_of_run
     from fastcontact.results.writer import ResultWriter
 
     if options.estimate_error:
@@ -145,7 +146,8 @@ def _write_steps(
     with ResultWriter(output, case.model, case_text=case.text, **settings) as writer:
         _check_same_case(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
-        earlier = [(step_entry(step), step.warnings) for step in writer.done]  # reads each step only once
+        # Each step is read only once.
+        earlier = [(step_entry(step), warnings_of_run(step.warnings, step.iterations)) for step in writer.done]
         steps = [summary for summary, _ in earlier]
         _warn_of_steps_outside_ramp(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))

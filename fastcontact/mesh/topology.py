@@ -107,6 +107,11 @@ def cached_by_mesh(function: MeshFunction[Arguments, Result]) -> MeshFunction[Ar
     return cached_by_mesh
 
 
+def points_of_solids(mesh: Mesh) -> Indices:
+    """Return the numbers (n,) of the points with a solid cell, in ascending order; reference points have none."""
+    return np.unique(np.concatenate([np.empty(0, np.intp), *(block.ravel() for block in mesh.solids.values())]))
+
+
 @typed(MeshError)
 @cached_by_mesh
 def bodies(mesh: Mesh) -> tuple[int, Numbers]:

@@ -17,11 +17,12 @@ from fastcontact._tools.units import inconsistency_message, si_value
 from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.energy import gradients_at, integration_rule
 from fastcontact.elasticity.loads import LOAD_POINTS, BodyForce, Load, Pressure, Traction, Value, evaluated
+from fastcontact.heat.loads import Film, Heating
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
-from fastcontact.mesh.topology import cached_by_mesh, outer_facets
+from fastcontact.mesh.topology import bodies, cached_by_mesh, outer_facets
 from fastcontact.model.checks import initial_gaps
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Pairs, Supports, prescribed_overlap_warnings
@@ -62,8 +63,8 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     texts = [*_moduli(model), *_units(model), *_proportions(model, float(motion.max())), poorest_cell(model.mesh)]
     texts += [hanging_nodes_warning(model), _close_nodes(model), *_friction(model), *_penetration(model, pairs, motion)]
     texts += [*_missing_ramps(model, ramp), *prescribed_overlap_warnings(pairs, supports), *_loads_on_supports(model)]
-    texts += [*split_side_warnings(pairs), *_sector_ends(model), *_shared_fluids(model), _quadrature(model.mesh)]
-    texts += [text for load in model.loads for text in _load_quadrature(model, load)]
+    texts += [*split_side_warnings(pairs), *_sector_ends(model), *_shared_fluids(model), *_insulating_contacts(model)]
+    texts += [_quadrature(model.mesh), *(text for load in model.loads for text in _load_quadrature(model, load))]
     return [text for text in texts if text]
 
 
@@ -77,6 +78,26 @@ def _sector_ends(model: Model) -> Iterator[str]:
                 "end: pressures near them may be wrong by as much as the mean pressure. Use matching meshes where contact "
                 "meets the ends"
             )
+
+
+def _insulating_contacts(model: Model) -> Iterator[str]:
+    """Yield a warning if no contact of a model with heat conduction has a conductance, although temperatures differ."""
+    if not model.heat_loads or any("conductance" in pair.options for pair in model.contact):
+        return
+    given = [load.ambient if isinstance(load, Film) else load.value for load in model.heat_loads]
+    heated = any(isinstance(load, Heating) for load in model.heat_loads)
+    body = bodies(model.mesh)[1]
+    of_two_bodies = [
+        f"'{pair.name}'" for pair in model.contact
+        if pair.obstacle is None
+        and not np.isin(body[model.mesh.points_of(pair.secondary)], body[model.mesh.points_of(pair.primary)]).any()
+    ]  # fmt: skip
+    is_uniform = all(isinstance(value, (int, float)) and value == given[0] for value in given)
+    if of_two_bodies and (heated or not is_uniform):
+        yield (
+            f"no heat flows across contact {', '.join(of_two_bodies)}, closed or not: give it a conductance, or "
+            "conductance=0.0 if it insulates"
+        )
 
 
 def _loads_on_supports(model: Model) -> Iterator[str]:

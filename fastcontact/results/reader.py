@@ -23,7 +23,7 @@ from fastcontact.errors import FileError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import journal, layout, tables
 from fastcontact.results.file_lock import is_being_written
-from fastcontact.results.step import ContactResult, MaterialStress, StepResult, StepSequence
+from fastcontact.results.step import ContactResult, MaterialStress, StepResult, StepSequence, warnings_of_run
 from fastcontact.results.units import units_of_results
 
 # HDF5 stores strings of variable length in global heap collections (HDF5 File Format Specification 3.0, section III.E). A
@@ -136,7 +136,7 @@ class Results(StepSequence):
     units : dict of str to str
         Names of units from the model or the case file, as described for `ContactResult`; empty if none were given.
     warnings : tuple of str
-        All distinct warnings of the run and of its steps.
+        All distinct warnings of the run and of its steps, except those that apply to a single step.
     log : object
         Log of the run, None without a log. If the run did not converge, it is ``{"failed_step": history}`` with the
         iterations of the step, or of the substep, that failed.
@@ -206,7 +206,7 @@ class Results(StepSequence):
         self.complete = run is not None and not self.error
         notes = [self._notes_of_step(number) for number in range(self._n_steps)]
         self.case_text = next((note["case"] for note in reversed(notes) if "case" in note), self.case_text)
-        step_warnings = [text for note in notes for text in note["warnings"]]
+        step_warnings = [text for note in notes for text in warnings_of_run(note["warnings"], note["iterations"])]
         unit_names = _read_json(group["units"], self._raw) if "units" in group else self._units_of_case()
         if not isinstance(unit_names, dict) or not all(isinstance(text, str) for text in unit_names.values()):
             raise ValueError("its units are not names")

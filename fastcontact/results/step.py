@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
@@ -87,6 +87,53 @@ def nodal_stress_of_materials(
     order = np.lexsort((recovery.von_mises(values), sides.points))
     stress[sides.points[order]] = values[order]
     return stress, MaterialStress(cells, sides.points, sides.material, values)
+
+
+# Smallest number of elements across the radius of a contact that resolves its pressure.
+MIN_ELEMENTS_ACROSS_RADIUS = 4
+
+
+def coarse_contact_text(name: str, *counts: int) -> str:
+    """Return the statement that a contact has only so many elements across its radius in one or several steps."""
+    low, high = min(counts), max(counts)
+    number = f"{low}" if low == high else f"{low} to {high}"
+    return f"contact '{name}' has only {number} {'elements' if high > 1 else 'element'} across its radius"
+
+
+def coarse_contact_notes(iterations: Mapping[str, Any]) -> list[str]:
+    """Return the warnings about contacts with too few elements across their radius, which apply to a single step.
+
+    `iterations` is `StepResult.iterations`.
+    """
+    needed = f"its pressure needs {MIN_ELEMENTS_ACROSS_RADIUS} or more"
+    coarse = iterations.get("coarse_contacts", {})
+    return [f"{coarse_contact_text(name, count)} in this step: {needed}" for name, count in coarse.items()]
+
+
+def warnings_of_run(warnings: Iterable[str], iterations: Mapping[str, Any]) -> list[str]:
+    """Return the `warnings` of a step that do not apply to this step only; `iterations` are those of the step."""
+    notes = coarse_contact_notes(iterations)
+    return [text for text in warnings if text not in notes]
+
+
+def coarse_contact_lines(iterations: Mapping[int, Mapping[str, Any]]) -> dict[str, str]:
+    """Return for each contact with too few elements across its radius a sentence on the steps in which this is the case.
+
+    `iterations` are `StepResult.iterations` of all steps, by the number of the step.
+    """
+    coarse: dict[str, dict[int, int]] = {}
+    for index, counts in iterations.items():
+        for name, count in counts.get("coarse_contacts", {}).items():
+            coarse.setdefault(name, {})[index] = count
+    lines = {}
+    for name, counts_of_pair in coarse.items():
+        first, last = min(counts_of_pair), max(counts_of_pair)
+        where = f"step {first}" if first == last else f"steps {first} to {last}"
+        if last - first + 1 > len(counts_of_pair):
+            where = f"{len(counts_of_pair)} of {len(iterations)} steps"
+        text = coarse_contact_text(name, *counts_of_pair.values())
+        lines[name] = f"{text} in {where}: pressures need {MIN_ELEMENTS_ACROSS_RADIUS} or more"
+    return lines
 
 
 # Fraction of the sum of the normal forces below which the resultant of a contact is negligible.
@@ -465,7 +512,8 @@ class StepResult(NameSuggestions):
         the average of the material with the largest von Mises stress. Components are xx, yy, zz, xy, in 3D also yz, xz;
         in axisymmetry rr, yy, hoop, ry.
     von_mises : ndarray (n_points,)
-        Equivalent stress of `stress` according to von Mises [pressure].
+        Equivalent stress of `stress` according to von Mises [pressure]. Nodal stresses are extrapolated from integration
+        points: in plastic bodies they may exceed the yield stress, while ``cell_fields["yield_ratio"]`` is at most 1.
     von_mises_signed : ndarray (n_points,)
         Equivalent stress with the sign of the trace of the stress [pressure].
     reaction : ndarray (n_points, dim)
@@ -482,6 +530,8 @@ class StepResult(NameSuggestions):
           whose amplitude is undetermined, and by how much bodies with such motions moved in the step [length].
         - ``scatter``, if round-off prevents the contact geometry from meeting the criterion: relative variation of
           ``displacement`` and of the contact ``force`` [-].
+        - ``coarse_contacts``, if there are any: number of elements across the radius of contacts with fewer than four,
+          by name of the pair.
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``, ``spin_factors``: multipliers of the
           temperatures, of the initial stresses and strains, of the pressures and of the centrifugal forces [-].
         - ``work``, ``pretension`` and ``reference_reactions``: data of the properties of the same names.
@@ -489,7 +539,8 @@ class StepResult(NameSuggestions):
         - ``parameter``, in vibration modes, whose shapes have no unit: quantity that the load factor represents,
           ``frequency`` or ``phase``.
     warnings : tuple of str
-        Warnings of the step.
+        Warnings of the step. All but the last step of a run contain only warnings that apply to a single step, about
+        contacts with too few elements across their radius; the first one also contains those about the model.
     cell_fields : dict of str to ndarray (n_solids,)
         Further fields with one value for each solid cell, in the order of ``mesh.solids``, for example an estimated error
         [unit of the field].

@@ -161,6 +161,7 @@ OTHERWISE = {
         "strains are large", "plastic strains are large", "rotations are large",
     ),
     "no message: the pressure is dominated by discretisation errors": ("the mesh does not resolve the contact",),
+    "no message: contact without a conductance insulates": ("no heat flows through a contact",),
     "no message: contact forces are too small": ("a penalty is too soft",),
     "no message: forces lose as many digits, or the matrix is singular": ("a spring that is a thousand times too stiff",),
     "no message: wear depths exceed the bodies": ("a coefficient of wear in another unit",),

@@ -438,6 +438,25 @@ def test_what_cannot_be_is_refused_by_its_name():
     refused(fc.errors.ModelError, "must not be negative", fc.solve, film, 1)
 
 
+@pytest.mark.parametrize(
+    ("told", "upper", "lower", "options"),
+    [
+        (True, 100.0, 0.0, {}),
+        (True, 100.0, 0.0, {"kind": "tied"}),
+        (False, 100.0, 0.0, {"conductance": 0.0}),
+        (False, 100.0, 100.0, {}),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_contact_without_conductance_between_different_temperatures_is_told(told, upper, lower, options):
+    model = joined(bar(conductivity=1.0), **options)
+    model.fix_temperature("UPPER_TOP", upper)
+    model.add_film("LOWER_BOTTOM", 1.0, lower)
+    step = fc.solve(model, 1)[-1]
+    assert told == any(text.startswith("no heat flows across contact 'c'") for text in step.warnings)
+    assert step.heat["contacts"].get("c", 0.0) == 0.0
+
+
 @pytest.mark.filterwarnings(REST)
 def test_functions_that_are_no_conductance_and_bodies_that_no_heat_reaches():
     model = joined(bar(conductivity=1.0), conductance=lambda p, g: p - 1.0)

@@ -21,6 +21,7 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.flat_pieces import flat_triangles
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import points_of_solids
 from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import MODEL_UNITS, Axes, Units, new_axes, position_text, units_of
 from fastcontact.results.plot.fields import Field, field_of
@@ -142,7 +143,7 @@ def deformed_shape(
         _axes.label_axes(axes, artist, plot_field, heading, units, "xyz")
         return axes if ax is not None else _axes.lay_out(axes)
     images = [points, points * [-1.0, 1.0]] if mirrored else [points]
-    extent = np.concatenate(images)
+    extent = np.concatenate([image[points_of_solids(plot_field.mesh)] for image in images])
     extent = extent if zoom is None else np.array(_axes.zoom_window(points[plot_field.extreme], zoom, extent))
     axes = new_axes(ax, _axes.figure_size(extent))
     for image in images:
@@ -514,7 +515,7 @@ def animate(
     target, scale = checked_target(path), scale_of(scale, mesh, steps)
     projection, size = None if mesh.dim == 2 else "3d", (6.4, 6.0)
     if mesh.dim == 2:
-        size = _axes.figure_size(mesh.points * [2.0 if mirrored else 1.0, 1.0], 3.8)
+        size = _axes.figure_size(mesh.points[points_of_solids(mesh)] * [2.0 if mirrored else 1.0, 1.0], 3.8)
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
     limits, box = _limits_of_steps(mesh, steps, field, scale, mirrored)
@@ -579,7 +580,7 @@ def _limits_of_steps(
     ranges, boxes = [], []
     for step in steps:  # steps of a result file are read one at a time
         ranges.append(field_of(mesh, step, field).range)
-        points = displaced_points(mesh.points, scale, step.displacement)
+        points = displaced_points(mesh.points, scale, step.displacement)[points_of_solids(mesh)]
         boxes.append((points.min(axis=0), points.max(axis=0)))
     low, high = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
     if mirrored and mesh.dim == 2:

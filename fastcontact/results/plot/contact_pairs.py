@@ -9,7 +9,7 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.topology import outer_facets
+from fastcontact.mesh.topology import outer_facets, points_of_solids
 from fastcontact.results.plot._axes import LETTER_WIDTH, Axes, figure_size, lay_out, new_axes
 from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
@@ -47,12 +47,13 @@ def contacts(
     >>> ax = fc.plot.contacts(fc.find_contacts(fc.generate.block_on_block()))
     """
     mesh = found_contacts.mesh
-    width, height = figure_size(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
+    points = mesh.points[points_of_solids(mesh)]
+    width, height = figure_size(points) if mesh.dim == 2 else (6.4, 6.2)
     # The legend is beside the axes.
     margin = LETTER_WIDTH * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
     height = max(height, 1.0 + 2 * LINE_HEIGHT * min(len(found_contacts), MAX_NAMED))
     if mesh.dim == 2:
-        width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + margin)
+        width = max(width, 4.2 * float(np.ptp(points[:, 0]) / np.ptp(points, axis=0).max()) + 1.1 + margin)
     else:
         width += margin
     axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
@@ -62,7 +63,7 @@ def contacts(
         axes.autoscale_view()
     else:
         _draw_3d(axes, found_contacts)
-        show_box(axes, mesh.points.min(axis=0), mesh.points.max(axis=0), view)
+        show_box(axes, points.min(axis=0), points.max(axis=0), view)
     axes.set(**{f"{axis}label": axis_label(axis, found_contacts.units, "length") for axis in "xyz"[: mesh.dim]})
     axes.set_title("1 contact" if len(found_contacts) == 1 else f"{len(found_contacts)} contacts")
     if len(found_contacts):

@@ -16,9 +16,10 @@ from fastcontact.elasticity.material_axes import rotated_stress
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import points_of_solids
 from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import MODEL_UNITS, Axes, Units, contacts_of, new_axes, outer_legend, units_of
-from fastcontact.results.step import ContactResult, StepResult, half_width
+from fastcontact.results.step import ContactResult, StepResult, coarse_contact_lines, half_width
 from fastcontact.results.units import axis_label, units_of_results, value_text
 
 
@@ -293,7 +294,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
         )
     origin, direction = _axis(step, pair)
     tolerance = 1e-9 * np.ptp(mesh.points, axis=0).max()
-    used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
+    used = points_of_solids(mesh)
     height = (mesh.points[used] - origin) @ direction
     offset = (mesh.points[used] - origin) @ np.array([direction[1], -direction[0]])
     # The direction of an oblique axis is the normal of a facet, whose error may be a few thousandths of a radian.
@@ -417,6 +418,8 @@ def history(
         units = units_of_results(units, "plane_strain")
     upper.set(ylabel=axis_label("sum of the normal forces" if cancels else "contact force", units, "force"))
     upper.set_title(title or f"Contact '{pair}' against the load", fontsize="medium")
+    coarse = coarse_contact_lines({step.index: step.iterations for step in steps})
+    lower.set_title(coarse.get(pair, ""), fontsize="small")
     abscissa = axis_label("approach", units, "length") if approach else "load factor"
     extent = "contact radius" if contacts[-1].extent == "radius" else "half-width of the contact"
     lower.set(xlabel=abscissa, ylabel=axis_label(extent, units, "length"))

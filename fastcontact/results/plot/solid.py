@@ -11,7 +11,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.mesh import elements
 from fastcontact.mesh.flat_pieces import flat_triangles
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import outer_facets
+from fastcontact.mesh.topology import outer_facets, points_of_solids
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.patches import lattice
 
@@ -140,7 +140,8 @@ def draw_solid(
         faces = np.vstack([faces, np.zeros((len(moved), 4))])
         lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(moved), 1))])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
-    show_box(ax, points.min(axis=0), points.max(axis=0), view)
+    in_solids = points[points_of_solids(plot_field.mesh)]
+    show_box(ax, in_solids.min(axis=0), in_solids.max(axis=0), view)
     return ScalarMappable(norm, plot_field.colours)
 
 

@@ -14,6 +14,7 @@ from fastcontact.analysis.problem import prepare
 from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.mesh.generate import block, box
+from fastcontact.results.step import coarse_contact_lines
 
 DEPTH = 0.01
 # Newton, metres and pascal; or millimetres and pressures of one.
@@ -227,6 +228,37 @@ def test_a_coarse_contact_that_has_opened_is_told_for_the_step_with_its_largest_
     (text,) = [text for text in texts if "across its radius" in text]
     assert text.startswith(
         "in load step 2, where its force is largest, contact 'ball' has" if at_end < 0.0 else "contact"
+    )
+
+
+def test_steps_in_which_a_contact_is_coarse_are_told_without_a_warning_of_the_run(tmp_path):
+    """The pressures of these steps are up to 20 % too large."""
+    mesh = fc.generate.block((4.0, 2.0), (48, 12), "quad8", (-2.0, 0.0))
+    model = elastic_model(mesh, "plane_strain", BOTTOM="xy")
+    disc = fc.obstacles.Sphere((0.0, 7.0), 5.0)
+    model.add_obstacle("disc", secondary="TOP", obstacle=disc, force={"y": -40.0})
+    instants = [0.02, 0.1, 0.25, 1.0]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", fc.FastcontactWarning)
+        steps = fc.solve(model, instants)
+    assert not [text for text in map(str, caught) if "across its radius" in text]
+    counts = [step.iterations.get("coarse_contacts", {}).get("disc", 4) for step in steps]
+    assert counts[0] == min(counts) < counts[2] < counts[3] == 4
+    for step, count in zip(steps[:3], counts, strict=False):
+        number = f"{count} element{'s' * (count > 1)}"
+        text = f"contact 'disc' has only {number} across its radius in this step: its pressure needs 4 or more"
+        assert text in step.warnings
+    resumed = fc.solve(model, instants, resume=fc.solve(model, instants[:2]))
+    assert [step.warnings for step in resumed[2:]] == [step.warnings for step in steps[2:]]
+    with fc.ResultWriter(tmp_path / "disc.vtkhdf", model) as out:
+        for step in steps:
+            out.write(step)
+    with fc.open_results(tmp_path / "disc.vtkhdf") as results:
+        assert [step.warnings for step in results] == [step.warnings for step in steps]
+        assert not [text for text in results.warnings if "across its radius" in text]
+    assert coarse_contact_lines({step.index: step.iterations for step in steps})["disc"] == (
+        f"contact 'disc' has only {counts[0]} to {counts[2]} elements across its radius in steps 1 to 3: pressures need 4 "
+        "or more"
     )
 
 

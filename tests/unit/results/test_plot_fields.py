@@ -556,7 +556,12 @@ def test_a_contact_that_stays_open_is_drawn_without_closed_nodes():
     assert ax.get_legend() is None
     assert ax.get_xlim()[1] >= 1.0
     contact = dataclasses.replace(contact, radius=(np.nan, np.nan))
-    step = dataclasses.replace(step_of(mesh), contact={"made": contact})
+    step = dataclasses.replace(
+        step_of(mesh), contact={"made": contact}, iterations={"coarse_contacts": {"made": 1, "b": 2}}
+    )
     upper, lower = fc.plot.history([step], "made")
     assert lower.get_legend() is None
+    assert lower.get_title() == (
+        "contact 'made' has only 1 element across its radius in step 1: pressures need 4 or more"
+    )
     assert list(upper.lines[0].get_ydata()) == [0.0]

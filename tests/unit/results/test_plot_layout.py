@@ -34,13 +34,18 @@ def test_texts_of_a_solid_are_whole_and_apart(size, view):
 @pytest.mark.parametrize("size", [(1.0, 1.0), (60.0, 15.0), (15.0, 60.0), (40.0, 2.0)], ids=str)
 def test_texts_of_sections_and_plane_bodies_are_whole_and_apart(size, zoom):
     plane, solid = fc.generate.block(size, (4, 4)), fc.generate.box((size[0], 2.0, size[1]), (4, 2, 4), "hex8")
-    zoom = zoom and zoom * min(size)
+    zoom, far = zoom and zoom * min(size), fc.generate.with_reference_points(plane, {"FAR": (-9.0 * size[0], 0.0)})
     for ax in (
         fc.plot.deformed_shape(plane, thousands(plane), zoom=zoom, units=fc.plot.UNITS),
         fc.plot.section(solid, thousands(solid), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), zoom=zoom, units=fc.plot.UNITS),
     ):
         ax.figure.canvas.draw()
         assert overlaps(texts(ax)) == []
+    sizes = [
+        fc.plot.deformed_shape(mesh, thousands(mesh, 0.01 * mesh.points)).figure.get_size_inches()
+        for mesh in (plane, far)
+    ]
+    assert sizes[0] == pytest.approx(sizes[1])  # space is for bodies only
 
 
 def test_a_section_says_how_displacements_are_scaled():
