@@ -135,7 +135,7 @@ def friction(settled, sizes: Sizes) -> tuple[float, float]:
     rubbing = np.linalg.norm(state.tangential, axis=1)
     outside = (rubbing - constraints.friction * state.multiplier).max(initial=0.0)
     # In steps that are solved in increments, slips may turn round between them.
-    work = -np.einsum("mk,mk->m", state.tangential, state.slip) if state.integrals is None else state.integrals[0]
+    work = -np.einsum("mk,mk->m", state.tangential, state.slip) if state.work is None else state.work
     driving = -work.min(initial=0.0)
     return float(outside / sizes.force), float(driving / (sizes.force * sizes.length))
 

@@ -357,7 +357,7 @@ def with_work(
     if pair.friction:
         # If the step is solved at once, slips of sticking constraints are elastic. If it is solved in increments, a
         # constraint that sticks at the end may have slid before.
-        at_once = solution.integrals is None
+        at_once = solution.work is None
         sliding = np.where(solution.sticking, 0.0, slip_integrals) if at_once else slip_integrals
         # Like the contact force, the integral is distributed to nodes that are closed at the beginning or at the end.
         closed = contact.active if before is None else contact.active | (before.pressing > 0.0)

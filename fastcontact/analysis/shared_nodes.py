@@ -142,8 +142,7 @@ class SharedNodes:
         normal, gap = self.normal_fraction * solution.multiplier[representative], solution.gap[representative]
         gap[self.behind] = constraints.gaps(u)[self.behind]
         active = solution.active[representative]
-        frame, early_slip, integrals = self.frame, solution.slip_before_closing, solution.integrals
-        fractions = np.stack([self.tangential_fraction, self.normal_fraction])
+        frame, early_slip, work = self.frame, solution.slip_before_closing, solution.work
 
         def along_own_tangents(components: Array) -> Array:
             rotated = np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", components, frame)[representative], frame)
@@ -157,7 +156,7 @@ class SharedNodes:
             active=active,
             next_active=active,
             sticking=solution.sticking[representative],
-            integrals=None if integrals is None else fractions * integrals[:, representative],
+            work=None if work is None else self.tangential_fraction * work[representative],
             slip_before_closing=None if early_slip is None else along_own_tangents(early_slip),
             tangential=self.tangential_fraction[:, None] * along_own_tangents(solution.tangential),
         )

@@ -180,33 +180,30 @@ class LastIncrement:
         Part of `slip` before the constraint closed in this step, zero if it was closed at the beginning [length].
     traction : ndarray (m, dim)
         Tangential force vectors [force].
-    integrals : ndarray (2, m)
-        See `Solution.integrals`, of the increments before the last one.
+    work : ndarray (m,)
+        See `Solution.work`, of the increments before the last one [energy].
     normal : ndarray (m,)
         Normal forces [force].
-    begin : float
-        Fraction of the step before the last increment.
     """
 
     slip: Array
     slip_before_closing: Array
     traction: Array
-    integrals: Array
+    work: Array
     normal: Array
-    begin: float
 
     def since_its_beginning(self, constraints: Constraints) -> Constraints:
         """Return the constraints with slips measured from the beginning of the increment."""
         return replace(constraints, slip0=constraints.slip0 - _components(self.slip, constraints.directions))
 
     def over_whole_step(self, solution: Solution) -> Solution:
-        """Return the solution with the slips and the integrals of the step, given the solution of its last increment."""
+        """Return the solution with the slips and the work of the step, given the solution of its last increment."""
         before = np.vstack([self.normal, _components(self.traction, solution.directions)])
         after = np.vstack([solution.multiplier, solution.tangential.T])
         return replace(
             solution,
             slip=solution.slip + _components(self.slip, solution.directions).T,
-            integrals=self.integrals + _integrals(before, after, solution.slip.T, 1.0 - self.begin),
+            work=self.work + _frictional_work(before, after, solution.slip.T),
             slip_before_closing=_components(self.slip_before_closing, solution.directions).T,
         )
 
@@ -244,9 +241,8 @@ class Solution:
         Unit tangents.
     response : callable, optional
         Function without arguments that returns the `Response` of this solution, for a constant contact state.
-    integrals : ndarray (2, m), optional
-        Frictional work in the step [energy], and mean normal forces in the step [force]; only if the step is solved in
-        increments.
+    work : ndarray (m,), optional
+        Frictional work in the step [energy]; only if the step is solved in increments.
     slip_before_closing : ndarray (m, k), optional
         Part of `slip` before the constraint closed in this step [length]; only if the step is solved in increments.
     last_increment : LastIncrement, optional
@@ -266,7 +262,7 @@ class Solution:
     residual: float = 0.0
     directions: tuple[Array, ...] = ()
     response: Callable[[], Response] | None = field(default=None, repr=False)
-    integrals: Array | None = None
+    work: Array | None = None
     slip_before_closing: Array | None = None
     last_increment: LastIncrement | None = None
 
@@ -282,7 +278,7 @@ class Solution:
         return Solution(
             self.u, self.multiplier[rows], self.gap[rows], self.active[rows], self.next_active[rows], self.settled,
             self.iterations, self.tangential[along], self.slip[along], self.sticking[rows], self.residual,
-            constraints.directions, integrals=None if self.integrals is None else self.integrals[:, rows],
+            constraints.directions, work=None if self.work is None else self.work[rows],
             slip_before_closing=None if early_slip is None else early_slip[along],
         )  # fmt: skip
 
@@ -300,7 +296,7 @@ class Solution:
 
 def in_increments(
     initial_offset: Array, closing: Array, y: Array, waiting: Mask, solve: IncrementSolver
-) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array, float]]:
+) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array]]:
     """Return the forces at the end of a load step that is solved in increments, which end where constraints close.
 
     Parameters
@@ -323,10 +319,10 @@ def in_increments(
         Gaps at the end of the step, and the slips of the whole step [length].
     before : tuple
         Data of `LastIncrement`: the components (3, k, m) of its three vectors along the tangents, and its attributes
-        `integrals`, `normal` and `begin`.
+        `work` and `normal`.
     """
     closed, slip, iterations, settled = y[0] > 0.0, np.zeros_like(initial_offset[1:]), 0, True
-    integrals = np.zeros((2, initial_offset.shape[1]))
+    work = np.zeros(initial_offset.shape[1])
     gap = last_gap = closing[0]
     slip_before_closing = np.zeros_like(slip)
     closing_slips = np.where(gap > 0.0, closing[1:], 0.0)
@@ -358,8 +354,8 @@ def in_increments(
             waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
-        before = np.stack([slip, slip_before_closing, y[1:]]), integrals, y[0], begin
-        integrals = integrals + _integrals(y, forces.y, forces.gaps[1:], end - begin)
+        before = np.stack([slip, slip_before_closing, y[1:]]), work, y[0]
+        work = work + _frictional_work(y, forces.y, forces.gaps[1:])
         total_slip = slip + forces.gaps[1:]
         slip = slip_after(forces.gaps[1:], forces.gaps[0])
         begin, y, closed, last_gap = end, forces.y, forces.closed, forces.gaps[0]
@@ -382,8 +378,8 @@ def _next_to_close(begin: Array, end: Array, waiting: Mask, count: int) -> tuple
     return fraction, closing & (fraction <= last * (1.0 + SINGLE_PRECISION))
 
 
-def _integrals(before: Array, after: Array, slip: Array, duration: float) -> Array:
-    """Return the `Solution.integrals` (2, m) of an increment, which is the fraction `duration` of the step.
+def _frictional_work(before: Array, after: Array, slip: Array) -> Array:
+    """Return the frictional work (m,) of an increment [energy].
 
     The tangential force is integrated over the slip by the trapezoidal rule. Since sliding friction is at its limit, the
     tangential force at the beginning is that at the end, scaled by the ratio of the normal forces. The slip of a constraint
@@ -398,5 +394,4 @@ def _integrals(before: Array, after: Array, slip: Array, duration: float) -> Arr
     """
     ratio = np.divide(before[0], after[0], out=np.zeros_like(after[0]), where=after[0] > 0.0)
     at_begin, at_end = (-0.5 * (forces[1:] * slip).sum(axis=0) for forces in (before, after))
-    work = np.where(after[0] > 0.0, (1.0 + ratio) * at_end, np.maximum(at_begin, 0.0))
-    return np.stack([work, 0.5 * duration * (before[0] + after[0])])
+    return np.where(after[0] > 0.0, (1.0 + ratio) * at_end, np.maximum(at_begin, 0.0))

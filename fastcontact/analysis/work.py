@@ -97,12 +97,17 @@ class ContactForces:
         """Return the part of the excess of normal forces over those at the other end of the step, `other`, that moves [-].
 
         A contact that moves over a surface leaves as much force behind as it gains ahead. Such a force acts during the
-        complete step, also at constraints that close or open.
+        complete step, also at constraints that close or open. The part is zero if areas are unknown.
         """
-        areas = self.areas if self.areas.size else np.ones(len(self.positions))
-        excess = areas * self.pressure - other.at(self.positions, areas)[0]
-        gained, lost = float(np.maximum(excess, 0.0).sum()), float(np.maximum(-excess, 0.0).sum())
+        if not (self.areas.size and other.areas.size):
+            return 0.0
+        gained, total, total_of_other = self.excess(other), *(float(f.areas @ f.pressure) for f in (self, other))
+        lost = gained - total + total_of_other
         return lost / max(gained, lost, TINY)
+
+    def excess(self, other: ContactForces) -> float:
+        """Return the sum of what the normal forces exceed those at the other end of the step, `other`, by [force]."""
+        return float(np.maximum(self.areas * self.pressure - other.at(self.positions, self.areas)[0], 0.0).sum())
 
     def pressing_with(self, other: ContactForces, at_one_end: float = 1.0) -> Array:
         """Return the normal forces (n_nodes,) that act on gaps during the step, if `other` are those at its other end.
@@ -247,9 +252,11 @@ def contact_work(
     if left.any():  # Constraints that slide beyond the end of the other side have no slip there.
         nodes = pair.points[pair.secondary.points]
         slips[left] = pair.nodal_slip(configuration)[nearest(nodes, constraints.positions[left])[1]]
+    moved_away = before.passed_on(after)
+    left_behind = moved_away and min(moved_away * before.excess(after) / max(float(normal_before.sum()), TINY), 1.0)
     work, touching, slip_integrals = _frictional_work(
-        pair, configuration, constraints, solution.integrals, normals, tangential, slips,
-        (after.passed_on(before), before.passed_on(after)),
+        pair, configuration, constraints, solution.work, normals, tangential, slips,
+        (after.passed_on(before), moved_away, left_behind),
     )  # fmt: skip
     sliding = -0.5 * float(((tangential[0] + tangential[1]) * slips).sum())
     displacement = configuration.displacement - configuration.start
@@ -264,8 +271,8 @@ def contact_work(
 
 
 def _frictional_work(
-    pair: Formulation, configuration: Configuration, constraints: Constraints, integrals: Array | None,
-    normals: tuple[Array, Array], tangential: tuple[Array, Array], slips: Array, passed_on: tuple[float, float],
+    pair: Formulation, configuration: Configuration, constraints: Constraints, increments: Array | None,
+    normals: tuple[Array, Array], tangential: tuple[Array, Array], slips: Array, passed_on: tuple[float, float, float],
 ) -> tuple[Array, float, Array]:  # fmt: skip
     """Return the frictional work in a step, its part at constraints that close or open, and integrals of normal forces.
 
@@ -276,14 +283,15 @@ def _frictional_work(
         Configuration of the pair in the step.
     constraints : Constraints
         The m constraints of the pair.
-    integrals : ndarray (2, m), optional
-        `Solution.integrals` of these constraints.
+    increments : ndarray (m,), optional
+        Frictional work of these constraints by increments, see `Solution.work` [energy].
     normals, tangential : (ndarray (m,), ndarray (m,)), (ndarray (m, dim), ndarray (m, dim))
         Normal and tangential forces at the beginning and at the end of the step [force].
     slips : ndarray (m, dim)
         Slip vectors [length].
-    passed_on : (float, float)
-        `ContactForces.passed_on` of the forces at the end, and of those at the beginning of the step [-].
+    passed_on : (float, float, float)
+        `ContactForces.passed_on` of the forces at the end, and of those at the beginning of the step, and the part of the
+        latter that leaves its place and acts elsewhere [-].
 
     Returns
     -------
@@ -297,19 +305,18 @@ def _frictional_work(
     (normal_before, normal), mu = normals, constraints.friction
     work_at_begin, work_at_end = (-0.5 * np.einsum("md,md->m", forces, slips) for forces in tangential)
     ratio = np.divide(normal_before, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
-    moved, moved_away = passed_on
-    # The work of all increments, in which constraints carry no force before they close.
-    if integrals is not None:
-        work, mean_force = integrals
-        mean_total = 0.5 * float((normal_before + normal).sum())
-        work = work * (1.0 + moved * (mean_total / float(mean_force.sum()) - 1.0) if mean_total else 1.0)
-        touching = 0.0
-    else:
-        mobilised = np.linalg.norm(tangential[1], axis=1).sum() / max(float(mu @ normal), TINY)
-        leaving = 0.5 * moved_away * mobilised * mu * normal_before * np.linalg.norm(slips, axis=1)
-        work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, leaving))
-        closing = _closing(pair, configuration, constraints, (normal_before == 0.0) & (work_at_end != 0.0))
-        touching = (1.0 - moved) * float(work_at_end[closing].sum())
+    moved, moved_away, left_behind = passed_on
+    mobilised = np.linalg.norm(tangential[1], axis=1).sum() / max(float(mu @ normal), TINY)
+    leaving = 0.5 * moved_away * mobilised * mu * normal_before * np.linalg.norm(slips, axis=1)
+    work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, leaving))
+    at_once = 1.0
+    if increments is not None:
+        # In increments, constraints carry no force before they close. Where a contact has moved over the surface, its force
+        # acts during the complete step.
+        at_once = max(moved, left_behind)
+        work = at_once * work + (1.0 - at_once) * increments
+    closing = _closing(pair, configuration, constraints, (normal_before == 0.0) & (work_at_end != 0.0))
+    touching = (at_once - moved) * float(work_at_end[closing].sum())
     if not normal.any():  # the contact is lost at an unknown instant
         touching += float(work.sum())
     slip_integrals = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)

@@ -343,6 +343,45 @@ def test_a_contact_that_moves_has_the_work_of_its_force(formulation, rigid):
     assert steps[-1].work["friction_while_touching"] < 0.01 * steps[-1].work["friction_work"]
 
 
+@pytest.mark.filterwarnings("ignore:.*of the work of friction is done at nodes")
+@pytest.mark.parametrize(
+    ("body", "options", "slide", "load", "error"),
+    [
+        (None, {}, 1.5, 1.0, 0.02),
+        (None, {"formulation": "mortar"}, 1.0, 0.1, 0.1),
+        ("primary", {"multipliers": "dual"}, 1.5, 1.0, 0.02),
+        ("primary", {"multipliers": "dual"}, 1.5, 0.1, 0.1),
+        ("primary", {"multipliers": "standard"}, 3.0, 1.0, 0.05),
+        ("secondary", {"multipliers": "dual"}, 1.5, 1.0, 0.02),
+    ],
+)
+def test_a_contact_that_moves_by_more_than_its_width_in_one_step(body, options, slide, load, error):
+    """A block is drawn along a cylinder, of which the part `load` is pressed in before: one step has the work of many."""
+    mesh, options = (
+        fc.generate.block((12.0, 2.0), (96, 8), origin=(-6.0, -2.0), name="LOW"),
+        {"friction": 0.3} | options,
+    )
+    press, low, works = [(0.0, 0.0), (1.0, load), (2.0, 1.0)], "LOW_" if body else "", []
+    if body:
+        cap = fc.generate.block((3.0, 2.0), (25, 6), origin=(-1.5, 0.0), name="UP")
+        x, y = cap.points.T
+        mesh = united(LOW_=mesh, UP_=cap.replace(points=np.column_stack([x, y + x**2 * (2.0 - y) / 20.0])))
+    for count in (1, 16):
+        model = elastic_model(mesh, "plane_strain", E=1000.0, **{f"{low}BOTTOM": "y"})
+        model.prescribe(f"{low}BOTTOM", x=-slide, ramp=[(0, 0), (1, 0), (2, 1)])
+        if body:
+            model.fix("UP_TOP", "x")
+            model.prescribe("UP_TOP", y=-0.05, ramp=press)
+            sides = ("LOW_TOP", "UP_BOTTOM")[:: -1 if body == "secondary" else 1]
+            model.add_contact("pair", secondary=sides[0], primary=sides[1], **options)
+        else:
+            cylinder = fc.obstacles.Sphere((0.0, 5.0), 5.0)
+            model.add_obstacle("pair", secondary="TOP", obstacle=cylinder, motion={"y": -0.04}, ramp=press, **options)
+        steps = fc.solve(model, [1.0, *np.linspace(1.0, 2.0, count + 1)[1:]])
+        works.append(sum(step.contact["pair"].dissipation for step in steps[1:]))
+    assert works[0] == pytest.approx(works[1], rel=error)
+
+
 @pytest.mark.filterwarnings("ignore:contact 'plane' has opened again")
 def test_slip_after_nodes_have_left_is_told():
     model = elastic_model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_strain", E=1e4)

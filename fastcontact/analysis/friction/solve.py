@@ -209,7 +209,7 @@ class _IncludedProblem:
 
     def in_increments(
         self, y0: Array, closing: Array, waiting: Mask
-    ) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array, float]]:
+    ) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array]]:
         """Return the solution along the load path, see `solution.in_increments`.
 
         `y0` and `closing` (1 + k, q) are those of `LoadPath.along`, rotated by Q.
@@ -282,7 +282,7 @@ def _included_problem(
 
 
 def _last_increment(
-    before: tuple[Array, Array, Array, float], Q: csr_array | None, rows: Indices, constraints: Constraints
+    before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints
 ) -> LastIncrement:
     """Return the data at the beginning of the last increment, for all constraints.
 
@@ -297,12 +297,12 @@ def _last_increment(
     constraints : Constraints
         All m constraints.
     """
-    components, integrals, normal, begin = before
+    components, work, normal = before
     no_gaps = np.zeros((1, len(rows)))
     along_tangents = np.stack([rotated(Q, np.vstack([no_gaps, along]), back=True)[1:] for along in components])
     m, dim = constraints.positions.shape
-    vectors, all_integrals, all_normal = np.zeros((3, m, dim)), np.zeros((2, m)), np.zeros(m)
+    vectors, all_work, all_normal = np.zeros((3, m, dim)), np.zeros(m), np.zeros(m)
     vectors[:, rows] = np.einsum("pkm,kmd->pmd", along_tangents, np.stack(constraints.directions)[:, rows])
-    all_integrals[:, rows], all_normal[rows] = integrals, normal
+    all_work[rows], all_normal[rows] = work, normal
     slip, slip_before_closing, traction = vectors
-    return LastIncrement(slip, slip_before_closing, traction, all_integrals, all_normal, begin)
+    return LastIncrement(slip, slip_before_closing, traction, all_work, all_normal)
