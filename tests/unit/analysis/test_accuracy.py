@@ -1,6 +1,7 @@
 """Forces balance to the criterion with every linear solver, and results of a load step agree with its solution."""
 
 import logging
+import warnings
 from dataclasses import replace
 
 import numpy as np
