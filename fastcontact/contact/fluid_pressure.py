@@ -224,6 +224,8 @@ def with_fluid_pressure(
         facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
         is_open = nodal_gap > -NARROW * facet_size
         passable = is_open & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
+        if config.impermeable is not None:
+            passable &= ~config.impermeable
     wetted = connected_nodes(side, source, passable)
     rows = wetted[node] & constraints.usable
     # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
