@@ -94,9 +94,9 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
     for name, pair in problem.pairs.items():
         configuration = problem.pairing_configuration(name, state, load, u)
         pressure, fluid = iterate.pressure.get(name), iterate.fluid.get(name)
-        if pressure is not None and fluid is not None:  # impermeable where the fluid has been displaced too often
-            pressure = np.where(fluid[1] < DISPLACEMENTS_UNTIL_DRY, pressure, np.inf)
-        parts[name] = pair.constraints(replace(configuration, pressure=pressure, rounded=iterate.rounded))
+        impermeable = None if fluid is None else fluid[1] >= DISPLACEMENTS_UNTIL_DRY
+        configuration = replace(configuration, pressure=pressure, impermeable=impermeable, rounded=iterate.rounded)
+        parts[name] = pair.constraints(configuration)
         if (wetted := parts[name].wetted) is not None:
             wet = wetted.pressure > 0.0
             was_wet, displaced = fluid or (wet, np.zeros(len(wet), int))

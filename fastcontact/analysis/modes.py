@@ -83,8 +83,8 @@ def modes(
     Raises
     ------
     ModelError
-        If a density is missing, the step belongs to another mesh, bodies yield, the equilibrium is unstable, or there
-        are fewer than n modes.
+        If a density is missing, the step belongs to another mesh, bodies have yielded in it, the equilibrium is unstable,
+        or there are fewer than n modes.
     ConvergenceError
         If the eigenvalue iteration does not converge.
 
@@ -217,7 +217,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
     Its unit is [force / length].
     """
     mesh, kinematics, bodies = model.mesh, model.kinematics, model.nonlinear_bodies(field)
-    if step is None or bodies is None:
+    if step is None or bodies is None or not bodies.finite:
         K = stiffness(mesh, kinematics, field.moduli, field.moduli_rows, None, field.treatment)
         K = with_springs(K, model.springs)
     if step is None:
@@ -225,9 +225,14 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
     names = ("temperature", "initial", "pressure", "spin")
     temperature, initial, pressures, spins = (step.iterations.get(f"{name}_factors", ()) for name in names)
     deformation = np.zeros_like(step.displacement)
-    if bodies is not None:
-        if model.strain == "small":
-            model.refuse_nonlinear("modes about a step are")
+    if bodies is not None and bodies.yields:
+        plastic_strain = step.cell_fields.get("plastic_strain")
+        if plastic_strain is None or plastic_strain.any():
+            raise ModelError(
+                "bodies have yielded in this step, and modes about it are not available: stress_stiffening=False returns "
+                "those of the undeformed elastic bodies, with the contact of the step"
+            )
+    if bodies is not None and bodies.finite:
         deformation, rise = step.displacement, model.expanding_rise(temperature, step.temperature)
         K = with_springs(bodies.at(deformation, bodies.initial_history, rise=rise).K, model.springs)
     else:

@@ -211,10 +211,11 @@ def recomputed_step(
     state, load = restart.put_back(problem, step, closed_pairs), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
     equilibrium = newton(prepare_start(problem, state, step.index, load))
-    u, no_values, inactive = equilibrium.u, np.empty(0), np.empty(0, bool)
-    without_contact = Solution.frictionless(u, no_values, no_values, inactive, inactive)
-    solution = without_contact if equilibrium.settled is None else equilibrium.settled.solution
-    return problem, MovingContact(problem, state, load, step.load_factor, u, solution)
+    u, no_values, inactive, pressures = equilibrium.u, np.empty(0), np.empty(0, bool), dict[str, Array]()
+    solution = Solution.frictionless(u, no_values, no_values, inactive, inactive)
+    if equilibrium.settled is not None:
+        solution, pressures = equilibrium.settled.solution, equilibrium.settled.iterate.pressure
+    return problem, MovingContact(problem, state, load, step.load_factor, u, solution, pressures)
 
 
 def _check_independent_of_path(model: Model, step: StepResult, criteria: Criteria) -> None:

@@ -187,7 +187,7 @@ class Work:
             Increments of `friction`, `touching` and the sum of `imbalance` and `wear`, see `contact_work`, of all pairs
             together [energy].
         released : float
-            Energy dissipated by cohesive layers so far [energy].
+            Energy of damage of cohesive layers so far, reversible for adhesion [energy].
         wear : float
             Increment of `wear` [energy].
         """

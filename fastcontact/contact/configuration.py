@@ -42,7 +42,9 @@ class Configuration:
     fluid_pressure : float
         Pressure of the fluid at its source [pressure].
     pressure : ndarray (n_nodes,), optional
-        Pressure at the secondary nodes in the last pairing, including that of fluid [pressure]; None before the first one.
+        Contact pressure at the secondary nodes in the last solution [pressure]; None before the first one.
+    impermeable : ndarray of bool (n_nodes,), optional
+        Secondary nodes that fluid cannot pass, whatever the contact pressure; None for no node.
     rounded : bool
         Whether pairings have alternated between two states. Then the normals of facets vary continuously across edges, see
         `pairing.pair`, and nodes of dual mortar with a small overlap have no gap.
@@ -64,6 +66,7 @@ class Configuration:
     bond: Bond | None = None
     fluid_pressure: float = 0.0
     pressure: Array | None = None
+    impermeable: Mask | None = None
     rounded: bool = False
     linearisation_point: Array | None = None
     friction_factor: float = 1.0

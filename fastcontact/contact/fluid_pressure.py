@@ -252,6 +252,8 @@ def with_fluid_pressure(
         facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
         is_open = nodal_gap > -NARROW * facet_size
         passable = is_open & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
+        if config.impermeable is not None:
+            passable &= ~config.impermeable
     wetted = connected_nodes(side, source, passable)
     # Where no contact is possible, the first row of each node transmits the force.
     pressure = np.where(wetted, config.fluid_pressure, 0.0)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import wrightomega
 
 from fastcontact._tools.argument_types import number_pairs
 from fastcontact.arrays import Array
@@ -21,10 +22,11 @@ class OverclosureLaw(ABC):
     """Contact pressure as a function of the overclosure, which is minus the gap."""
 
     @abstractmethod
-    def tangent(self, overclosure: Array) -> tuple[Array, Array]:
-        """Return slopes (m,) [pressure / length] and zeros (m,) [length] of the tangents at overclosures (m,) [length].
+    def tangent(self, overclosure: Array, compliance: float = 0.0) -> tuple[Array, Array]:
+        """Return slopes (m,) [pressure / length] and zeros (m,) [length] of tangents of the law.
 
-        The zero of a tangent is the overclosure at which its pressure vanishes.
+        The zero of a tangent is the overclosure at which its pressure vanishes. The law acts in series with a linear
+        `compliance` [length / pressure], and `overclosure` (m,) [length] is the sum of the overclosures of both.
         """
 
     @abstractmethod
@@ -56,9 +58,10 @@ class TabularLaw(OverclosureLaw):
         self.table = rows
         self._slopes = np.diff(rows[:, 1]) / np.diff(rows[:, 0])
 
-    def tangent(self, overclosure: Array) -> tuple[Array, Array]:
+    def tangent(self, overclosure: Array, compliance: float = 0.0) -> tuple[Array, Array]:
         """See `OverclosureLaw.tangent`."""
-        interval = np.clip(np.searchsorted(self.table[:, 0], overclosure, side="right") - 1, 0, len(self._slopes) - 1)
+        sums = self.table[:, 0] + compliance * self.table[:, 1]
+        interval = np.clip(np.searchsorted(sums, overclosure, side="right") - 1, 0, len(self._slopes) - 1)
         return self._slopes[interval], self.table[interval, 0] - self.table[interval, 1] / self._slopes[interval]
 
     def energy(self, pressure: Array) -> Array:
@@ -84,8 +87,12 @@ class ExponentialLaw(OverclosureLaw):
     def __init__(self, clearance: float, pressure: float) -> None:
         self._clearance, self._pressure, self._rate = clearance, pressure, np.log(100.0) / clearance
 
-    def tangent(self, overclosure: Array) -> tuple[Array, Array]:
+    def tangent(self, overclosure: Array, compliance: float = 0.0) -> tuple[Array, Array]:
         """See `OverclosureLaw.tangent`."""
+        if compliance:
+            # The product w of the rate and the overclosure of the compliance satisfies w + ln w = z.
+            z = self._rate * overclosure + np.log(self._rate * compliance * self._pressure)
+            overclosure = overclosure - wrightomega(z) / self._rate
         h = np.clip(overclosure, -self._clearance, LARGEST_OVERCLOSURE * self._clearance)
         return self._rate * self._pressure * np.exp(self._rate * h), h - 1.0 / self._rate
 

@@ -662,7 +662,8 @@ class StepResult(NameSuggestions):
           gaps close, unless they take over the forces of other nodes, and by pairs in the step in which all their nodes
           open. In long steps, this part is overestimated.
         - ``penalty_energy``: energy of penalties and cohesive layers, and of the small compliance of pressure fields.
-        - ``energy_released``: energy dissipated by damage of cohesive layers.
+        - ``energy_released``: energy dissipated by damage of cohesive layers. For adhesion, this energy is
+          reversible: it decreases as the surfaces approach each other.
         - ``wear_work``: work of contact pressures on the wear depth. Wear may also change the strain energy.
         - ``imbalance``: external work minus the sum of all other energies.
 

@@ -513,6 +513,25 @@ def pressed_column(divisions):
     return model, fc.solve(model, 1)[0]
 
 
+def yielded_bar(load, law, strain="small"):
+    """A bar under tension, whose material yields at 5, and its step."""
+    model = fc.Model(block((4.0, 1.0), (8, 2), "quad8"), "plane_stress", strain=strain)
+    model.add_material(law)
+    supported(model, LEFT="x", BOTTOM="y")
+    model.add_traction("RIGHT", x=load)
+    return model, fc.solve(model, 1)[0]
+
+
+PLASTIC = fc.ElasticPlastic(1000.0, 0.3, yield_stress=5.0, hardening=[(0.0, 5.0), (0.1, 15.0)], density=1.0)
+
+
+def test_before_yield_the_modes_are_elastic_ones():
+    plastic, elastic = (
+        fc.modes(*yielded_bar(4.9, law), 3) for law in (PLASTIC, fc.LinearElastic(1000.0, 0.3, density=1.0))
+    )
+    assert plastic.frequencies == pytest.approx(elastic.frequencies, rel=1e-10)
+
+
 def test_what_is_refused():
     model = model_of(block((1.0, 0.1), (10, 1)), "plane_stress")
     column, other = pressed_column((41, 2))
@@ -528,3 +547,11 @@ def test_what_is_refused():
     for model, step in (pressed_column((10, 1)), (column, other)):  # all modes at once, and by iterations
         refused(fc.ModelError, "the equilibrium of the step is unstable", fc.modes, model, step)
         assert fc.modes(model, step, 1, stress_stiffening=False).frequencies[0] > 0.0
+    for strain in ("small", "finite"):
+        yielded = yielded_bar(5.5, PLASTIC, strain)
+        refused(fc.ModelError, "bodies have yielded in this step", fc.modes, *yielded)
+        elastic = fc.modes(*yielded, 1, stress_stiffening=False).frequencies[0]
+        assert elastic == pytest.approx(np.sqrt(1000.0) / 16.0, rel=5e-3)  # the bar also contracts
+        refused(
+            fc.ModelError, "plastic bodies depend on their history", yielded[0].internal_forces, yielded[1].displacement
+        )

@@ -103,15 +103,16 @@ def test_a_penalty_is_a_positive_number(penalty):
 
 
 TABLE = [(-0.002, 0.0), (0.0, 1.0), (0.002, 4.0), (0.004, 12.0)]
+EXPONENTIAL = {"clearance": 0.002, "pressure": 2.0}
 
 
-def layered(formulation, element, approach, matching=True, penalty=TABLE):
-    """Press two blocks with a soft layer between them; return the last step."""
+def layered(formulation, element, approach, matching=True, penalty=TABLE, tilt=0.0):
+    """Press two blocks, the upper one tilted, with a soft layer between them; return the last step."""
     low = fc.generate.block((1.0, 1.0), (4, 4), element=element)
     up = fc.generate.block((1.0, 1.0), (4 if matching else 3, 3), element=element, origin=(0.0, 1.0), name="UP")
     up = fc.generate.renamed(up, {name: "U" + name for name in ("BOTTOM", "TOP", "LEFT", "RIGHT")})
     model = elastic_model(fc.generate.union(low, up), "plane_strain", nu=0.0, BOTTOM="xy", UTOP="x")
-    model.prescribe("UTOP", y=-approach)
+    model.prescribe("UTOP", y=lambda x: -approach - tilt * x[:, 0])
     model.add_contact("pair", secondary="UBOTTOM", primary="TOP", formulation=formulation, penalty=penalty)
     return fc.solve(model, 3)[-1]
 
@@ -136,6 +137,18 @@ def test_a_table_of_pressures(element, matching, approach):
 def test_a_table_of_pressures_in_every_formulation(formulation):
     found, mortar = (layered(name, "quad4", 0.02).contact["pair"].pressure for name in (formulation, "mortar"))
     assert found == pytest.approx(mortar, rel=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the energy of these load steps")
+@pytest.mark.parametrize(
+    ("formulation", "penalty"),
+    [("continuous", [(0, 0), (0.002, 2), (0.01, 40)]), *((name, EXPONENTIAL) for name in ("continuous", "mortar"))],
+)
+def test_laws_under_pressures_that_vary_take_few_pairings(formulation, penalty):
+    """Of a table, the interval must not alternate at points whose pressures the field does not represent."""
+    step, dual = (layered(name, "quad4", 0.01, False, penalty, 0.02) for name in (formulation, None))
+    assert step.iterations["geometry_updates"] <= 5
+    assert step.contact["pair"].force[1] == pytest.approx(dual.contact["pair"].force[1], rel=2e-3)
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,8 @@ def configuration_of(step: StepResult | None, name: str, pair: Formulation) -> C
     """Return the configuration of a pair at the end of a step, or at rest."""
     if step is None:
         return Configuration.undeformed(pair.points)
-    contact, configuration = step.contact[name], end_of(step, step, name)
+    contact = step.contact[name]
+    configuration = replace(end_of(step, step, name), pressure=contact.pressure)
     if contact.wear is None:
         return configuration
     return replace(configuration, wear_depth=at_points(contact.points, contact.wear, len(pair.points)))

@@ -56,6 +56,8 @@ class MovingContact:
         Displacements of the step [length].
     solution : Solution
         Multipliers and active set of the step.
+    pressures : dict of str to ndarray (n_nodes,)
+        Nodal pressures of each contact pair in the solution [pressure].
     closed : ndarray of bool (n_nodes,), optional
         Closed nodes of the contact pair whose pressures are requested.
     pair : str
@@ -68,6 +70,7 @@ class MovingContact:
     instant: float
     u: Array
     solution: Solution
+    pressures: dict[str, Array]
     closed: Mask | None = None
     pair: str = ""
 
@@ -83,7 +86,7 @@ class MovingContact:
 
     def constraints_at(self, u: Array) -> StackedConstraints:
         """Return the constraints of surfaces paired at displacements u (n_dofs,) [length]."""
-        constraints = pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
+        constraints = pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, self.pressures))
         if len(constraints) != (count := len(self.solution.multiplier)):
             raise ModelError(
                 f"contact has {count} constraints, but {len(constraints)} if nodes move: nodes of both sides coincide, and "

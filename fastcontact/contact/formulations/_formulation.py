@@ -173,7 +173,7 @@ class Formulation(ContactSides, ABC):
             raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         softness = np.zeros_like(constraints.softness)
         if isinstance(normal, OverclosureLaw):
-            slope, zero = normal.tangent(-constraints.gaps(config.displacement))
+            slope, zero = self.tangent_of_law(normal, constraints, config)
             constraints = replace(constraints, gap0=constraints.gap0 + zero, law=normal)
             softness[0] = 1.0 / (slope * areas)
         elif normal is not None:
@@ -181,6 +181,12 @@ class Formulation(ContactSides, ABC):
         if tangential is not None:
             softness[1:] = 1.0 / (tangential(constraints.positions) * areas)
         return replace(constraints, softness=softness)
+
+    def tangent_of_law(
+        self, law: OverclosureLaw, constraints: Constraints, config: Configuration
+    ) -> tuple[Array, Array]:
+        """Return the `OverclosureLaw.tangent` of a law at the overclosures of the constraints (m,)."""
+        return law.tangent(-constraints.gaps(config.displacement))
 
     @cached_property
     def _initial_gaps(self) -> tuple[Array, Array]:

@@ -41,6 +41,7 @@ from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import nodes_with_area
 from fastcontact.contact.multiplier_field import Projection
+from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.supported_nodes import directions_without_slip, nodes_with_prescribed_gap
 from fastcontact.contact.surface import Surface
@@ -193,6 +194,10 @@ class PressureField(NodalField):
         closed[nodes_of_open_facets[pressure[nodes_of_open_facets] > 0]] = True
         return closed
 
+    def at_points(self, pressure: Array) -> Array:
+        """Return the field (m,) at the integration points [pressure] for nodal values `pressure` (n_nodes,) [pressure]."""
+        return np.asarray(self.projection.P @ pressure[self.independent])
+
     def initial_active_set(self, gap: Array, pressure: Array, previous: Mask) -> Mask:
         """Return the points (m,) at which the field exceeds rho times the gap, as an initial active set.
 
@@ -200,8 +205,7 @@ class PressureField(NodalField):
         """
         if not self.has_new_points:
             return previous
-        field = self.projection.P @ pressure[self.independent]
-        return (self.projection.areas > 0) & (field - self.projection.rho * gap > 0)
+        return (self.projection.areas > 0) & (self.at_points(pressure) - self.projection.rho * gap > 0)
 
 
 def _nearest(facet_nodes: Indices, shape: Array, n_nodes: int) -> Mask:
@@ -298,6 +302,22 @@ class PressureFieldFormulation(Formulation):
             Z = self._compliance_at_supports(field, constraints, directions, config)
         areas = np.where(projection.areas > 0, projection.areas, np.inf)
         return replace(constraints, low_rank_compliance=Z, areas=areas, nodal=field, coupled_directions=directions)
+
+    def tangent_of_law(
+        self, law: OverclosureLaw, constraints: Constraints, config: Configuration
+    ) -> tuple[Array, Array]:
+        r"""See `Formulation`. The overclosure of the law is that of the gap minus that of the compliance C.
+
+        With the pressure p of a point, the latter is :math:`(p - \lambda_h) / \rho`. For given gaps and a given field, the
+        law determines p, so that the tangent depends on the displacements and the field to second order only.
+        """
+        field = constraints.nodal
+        if not isinstance(field, PressureField):
+            return super().tangent_of_law(law, constraints, config)
+        overclosure, compliance = -constraints.gaps(config.displacement), 1.0 / field.projection.rho
+        if config.pressure is not None:
+            overclosure = overclosure + compliance * field.at_points(config.pressure)
+        return law.tangent(overclosure, compliance)
 
     def _compliance_at_supports(
         self, field: PressureField, constraints: Constraints, directions: tuple[Array, ...], config: Configuration

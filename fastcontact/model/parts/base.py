@@ -378,7 +378,7 @@ class ModelBase(NameSuggestions):
             raise ModelError(f"the displacement has shape {np.shape(displacement)}, but the mesh requires {shape}")
         bodies = self.nonlinear_bodies(field)
         if bodies is not None:
-            if self.strain == "small":
+            if bodies.yields:
                 raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
             if self.temperatures or self.heat_loads:
                 raise ModelError("forces of bodies with thermal expansion depend on the temperature: see step.reaction")

@@ -167,9 +167,13 @@ def test_bodies_held_by_contact_alone():
     assert compare(make, [("pressure_max", "c"), ("displacement", corner, "y")], loaded).error < 1e-6
 
 
+LAWS = [[(0.0, 0.0), (0.005, 10.0), (0.02, 200.0)], {"clearance": 0.02, "pressure": 5.0}]
+CONTINUOUS = [{"penalty": law, "formulation": "continuous"} for law in LAWS]
+
+
 @pytest.mark.filterwarnings("ignore:contact 'c' penetrates by")
 @pytest.mark.each_value
-@pytest.mark.parametrize("options", [{"kind": "tied"}, {"kind": "bilateral"}, {"penalty": 1e5}], ids=str)
+@pytest.mark.parametrize("options", [{"kind": "tied"}, {"kind": "bilateral"}, {"penalty": 1e5}, *CONTINUOUS], ids=str)
 @pytest.mark.parametrize(("element", "kinematics"), [("quad4", "plane_strain"), ("tri6", "plane_stress")])
 def test_other_kinds_of_contact(element, kinematics, options):
     assert compare(two_blocks(element, kinematics, **options), [("reaction", "UPPER_TOP", "y")], MOVED).error < 1e-6
