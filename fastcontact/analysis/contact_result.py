@@ -12,7 +12,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.work import ContactForces, contact_work
-from fastcontact.arrays import Array, Mask, Numbers
+from fastcontact.arrays import Array, Mask, Numbers, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.contact_middle import contact_middle
@@ -41,15 +41,30 @@ def contact_results(
         See `State.first_contact`.
     """
     problem, displacement, results = step.problem, step.problem.displacement(u), {}
-    for name, part in settled.parts.items():
+    slip_error = min(problem.criteria.geometry, LENGTH_ROUND_OFF) * max(largest(u), largest(step.state.u))
+    for name, (constraints, solution) in settled.parts.items():
+        solution = _without_undetermined_slip(constraints, solution, max(slip_error, step.state.gap_round_off))
         configuration = problem.pairing_configuration(name, step.state, step.load, u)
-        arguments = *part, configuration, displacement, first_contact.get(name)
+        arguments = constraints, solution, configuration, displacement, first_contact.get(name)
         results[name] = contact_result(name, problem.pairs[name], *arguments)
         if problem.model.periodic_interfaces:
             results[name] = _with_periodic_nodes(problem.pairs[name], results[name])
         if problem.model.strain == "finite":
             results[name] = _on_deformed_surface(problem.pairs[name], results[name], displacement)
     return results
+
+
+def _without_undetermined_slip(constraints: Constraints, solution: Solution, slip_error: float) -> Solution:
+    """Return the solution of a pair in which constraints whose slips in the step do not exceed `slip_error` [length] stick.
+
+    If a constraint has slid in an earlier step and does not slide in this one, its force remains at the limit of friction.
+    Whether the law of friction regards it as sticking or sliding then depends on round-off.
+    """
+    if not constraints.tangents:
+        return solution
+    frictional = solution.active & (constraints.friction > 0.0)
+    at_rest = frictional & (np.linalg.norm(solution.slip, axis=1) <= slip_error)
+    return replace(solution, sticking=solution.sticking | at_rest)
 
 
 def contact_result(
