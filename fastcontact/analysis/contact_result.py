@@ -7,12 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array, diags_array, eye_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
 
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.work import ContactForces, contact_work
-from fastcontact.arrays import Array, Mask, Numbers
+from fastcontact.arrays import Array, Indices, Mask, Numbers, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.contact_middle import contact_middle
@@ -41,15 +44,29 @@ def contact_results(
         See `State.first_contact`.
     """
     problem, displacement, results = step.problem, step.problem.displacement(u), {}
-    for name, part in settled.parts.items():
+    slip_error = min(problem.criteria.geometry, LENGTH_ROUND_OFF) * max(largest(u), largest(step.state.u))
+    for name, (constraints, solution) in settled.parts.items():
+        solution = _without_undetermined_slip(constraints, solution, max(slip_error, step.state.gap_round_off))
         configuration = problem.pairing_configuration(name, step.state, step.load, u)
-        arguments = *part, configuration, displacement, first_contact.get(name)
+        arguments = constraints, solution, configuration, displacement, first_contact.get(name)
         results[name] = contact_result(name, problem.pairs[name], *arguments)
         if problem.model.periodic_interfaces:
             results[name] = _with_periodic_nodes(problem.pairs[name], results[name])
         if problem.model.strain == "finite":
             results[name] = _on_deformed_surface(problem.pairs[name], results[name], displacement)
     return results
+
+
+def _without_undetermined_slip(constraints: Constraints, solution: Solution, slip_error: float) -> Solution:
+    """Return the solution of a pair in which constraints whose slips in the step do not exceed `slip_error` [length] stick.
+
+    If a constraint has slid in an earlier step and does not slide in this one, its force remains at the limit of friction.
+    Whether the law of friction regards it as sticking or sliding then depends on round-off.
+    """
+    if not constraints.tangents:
+        return solution
+    at_rest = solution.active & (constraints.friction > 0.0) & (np.linalg.norm(solution.slip, axis=1) <= slip_error)
+    return replace(solution, sticking=solution.sticking | at_rest)
 
 
 def contact_result(
@@ -312,20 +329,38 @@ def _within_cone(constraints: Constraints, shear: Array, pressure: Array, normal
     """Return nodal shear (n, dim) that satisfies Coulomb's law with the nodal pressures (n,) [pressure].
 
     The constraints obey this law, but a projection onto nodal values does not preserve inequalities, and the normals of the
-    constraints differ from those of the nodes. As in `closed_node_pressures`, the excess over the limit is moved to the
-    nearest nodes that can carry it, which preserves the resultant.
+    constraints differ from those of the nodes. The excess over the limit is moved to nearby nodes that can carry it, which
+    preserves the resultant. The shear is a continuous function of the forces: many sliding nodes are exactly at the limit,
+    and round-off must not decide whether they receive an excess.
     """
     areas, limit = constraints.nodal_field.nodal_areas, constraints.friction.max() * np.maximum(pressure, 0.0)
     receivers = (limit > 0.0) & nodes_with_area(areas, [block.local for block in side.blocks])
     while True:
         size = np.linalg.norm(shear, axis=1)
-        over, receivers = size > (1.0 + SUM_ROUND_OFF) * limit, receivers & (size < limit)
+        over, receivers = size > (1.0 + SUM_ROUND_OFF) * limit, receivers & (size < (1.0 - SUM_ROUND_OFF) * limit)
         within = shear * np.divide(limit, size, out=np.ones_like(size), where=over)[:, None]
         if not (receivers.any() and over.any()):
             return within
-        excess = np.where(over[:, None], shear - within, 0.0) * areas[:, None]
-        received = np.column_stack([_received_pressures(receivers, part, areas, side) for part in excess.T])
+        free = np.where(receivers, (limit - size) * areas, 0.0)
+        force = _absorbed((shear - within) * areas[:, None], free, np.flatnonzero(limit > 0.0), side)
+        received = np.divide(force, areas[:, None], out=np.zeros_like(force), where=receivers[:, None])
         shear = within + received - np.einsum("nd,nd->n", received, normal)[:, None] * normal
+
+
+def _absorbed(excess: Array, free: Array, nodes: Indices, side: Surface) -> Array:
+    """Return the forces (n, dim) that nodes receive from the `excess` (n, dim) of others [force].
+
+    The excess moves between neighbours among the closed `nodes` (k,). The fraction that stays at a node on each visit
+    increases from zero to one with its `free` capacity (n,) [force], compared with the largest excess. A connected part of
+    the contact without free capacity receives nothing.
+    """
+    part = connected_components(side.extended_adjacency[nodes][:, nodes])[1]
+    nodes = nodes[np.bincount(part, free[nodes])[part] > 0.0]
+    neighbours, absorbed = csr_array(side.extended_adjacency[nodes][:, nodes]), np.zeros_like(excess)
+    staying = free[nodes] / (free[nodes] + np.linalg.norm(excess, axis=1).max())
+    walk = eye_array(len(nodes)) - neighbours @ diags_array((1.0 - staying) / neighbours.sum(axis=0))
+    absorbed[nodes] = staying[:, None] * splu(walk.tocsc()).solve(excess[nodes])
+    return absorbed
 
 
 def mean_slip_before_closing(constraints: Constraints, solution: Solution, result: ContactResult) -> Array:

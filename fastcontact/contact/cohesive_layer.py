@@ -174,8 +174,8 @@ def cohesive_rows(
         positions=np.tile(constraints.positions, (len(separation), 1)),
         areas=np.tile(constraints.areas, len(separation)),
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(separation)),
-        compliance=None, tangents=(), directions=(), tied=layer, geometry=lambda *_: Softening(B, correction),
-        friction=no_values, slip0=no_values, elastic_slip=no_values,
+        compliance=None, tangents=(), directions=(), coupled_directions=(), tied=layer,
+        geometry=lambda *_: Softening(B, correction), friction=no_values, slip0=no_values, elastic_slip=no_values,
         low_rank_compliance=no_values, branches=np.where(growing, 1 + nearest_axis, 0) + 4 * stiffened + 8 * ~intact,
     ).without(np.concatenate([np.zeros(m, bool), *[~intact] * len(slip0)]))  # fmt: skip
 

@@ -230,7 +230,7 @@ class ContactResult(NameSuggestions):
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)
-        Whether each node is closed and sticks; without friction all closed nodes stick.
+        Whether each node is closed and does not slide in this step; without friction all closed nodes stick.
     stick_bounds : (float, float), optional
         The property `stick_radius` in 3D, where it depends on the facets [length]; None in 2D and in files of earlier
         versions.

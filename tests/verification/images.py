@@ -247,6 +247,14 @@ def floating_ball(formulation, **options):
     )
 
 
+def flat_top(element, **options):
+    """A block below a rigid plane: its whole top slides except for the middle, so that many nodes reach the limit."""
+    return Job(
+        fc.generate.block((1.4, 0.8), (4, 3), element), "plane_strain",
+        obstacles=(("TOP", (0.0, 0.8), (0.0, -1.0), (0.0, -0.01), options),), supports=(("BOTTOM", (0.0, 0.0)),),
+    )  # fmt: skip
+
+
 def on_plane(dim, **options):
     """A cylinder or a sphere pressed on a rigid plane that moves aside."""
     if dim == 2:

@@ -74,6 +74,22 @@ def test_the_law_is_traced_exactly(options, element):
     assert damage == 1.0
 
 
+@pytest.mark.parametrize("element", ["quad4", "quad8", "hex8"])
+@pytest.mark.parametrize("options", FORMULATIONS)
+def test_a_layer_below_a_frictional_obstacle_does_not_depend_on_the_order_of_pairs(options, element):
+    """A plate presses the blocks by 0.02 and slides along them."""
+    axis, top, area = ("z", "B ZMAX", 4.0) if element == "hex8" else ("y", "B TOP", 2.0)
+    for first in ("glue", "plate"):
+        model = glued(element, **options)
+        model.supports.pop()  # of the top
+        down = -np.eye(model.mesh.dim)[-1]
+        plane, motion = fc.obstacles.HalfSpace(-2.0 * down, down), {"x": 0.05, axis: -0.02}
+        model.add_obstacle("plate", secondary=top, obstacle=plane, motion=motion, friction=0.1)
+        model.contact.sort(key=lambda pair: pair.name != first)
+        force, pressing = fc.solve(model, 1)[-1].contact["plate"].force, -area * exact(-0.02, 0.0)[0]
+        assert (force[0], force[-1]) == pytest.approx((0.1 * pressing, -pressing), rel=1e-9)
+
+
 @pytest.mark.parametrize("options", FORMULATIONS)
 def test_a_clearance_with_a_ramp_opens_a_layer_as_a_motion_does(options):
     """A constant clearance belongs to the initial gap, at which the layer is free of stress."""

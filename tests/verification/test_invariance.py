@@ -10,6 +10,7 @@ from images import (
     cylinder,
     differences,
     discs,
+    flat_top,
     floating,
     floating_ball,
     image_of,
@@ -53,6 +54,7 @@ def along_axes():
         yield f"discs {formulation}", discs(formulation)
         yield f"floating {formulation}", floating(formulation)
         yield f"floating ball {formulation}", floating_ball(formulation)
+    yield "flat top", flat_top("quad8", friction=0.1)
 
 
 WHOLE, AXES = dict(whole_supports()), dict(along_axes())

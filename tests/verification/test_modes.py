@@ -209,12 +209,15 @@ def test_what_slides_is_free_along_the_surface_unless_it_is_held():
     for name, options in {"slides": {"friction": 0.05}, "tied": {"kind": "tied"}}.items():
         model = model_of(mesh, "plane_strain", **{"LOW BOTTOM": "xy", "UP TOP": {"x": 2e-4, "y": -2e-4}})
         model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options)
-        (step,) = fc.solve(model, 1)
+        step, held = fc.solve(model, fc.Ramp((1.0, 2.0), ((0.0, 0.0), (1.0, 1.0), (2.0, 1.0))))
         own = {"stress_stiffening": False, "n": 3}
         found[name] = fc.modes(model, step, hold_sliding=True, **own).frequencies
         if name == "slides":
             assert not (step.contact["joint"].active & step.contact["joint"].sticking).any()
             assert fc.modes(model, step, **own).frequencies[0] < 0.85 * found[name][0]
+        # Under a constant load nothing slides, although the forces remain at the limit of friction.
+        assert held.contact["joint"].sticking[held.contact["joint"].active].all()
+        assert fc.modes(model, held, **own).frequencies == pytest.approx(found[name], rel=1e-9)
     assert found["slides"] == pytest.approx(found["tied"], rel=1e-3)
 
 
