@@ -307,7 +307,9 @@ def _frictional_work(
     ratio = np.divide(normal_before, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
     moved, moved_away, left_behind = passed_on
     mobilised = np.linalg.norm(tangential[1], axis=1).sum() / max(float(mu @ normal), TINY)
-    leaving = 0.5 * moved_away * mobilised * mu * normal_before * np.linalg.norm(slips, axis=1)
+    # Where the contact has left, the surfaces are apart, and tangents are inclined: the slip is that of the new contact.
+    slip = float(normal @ np.linalg.norm(slips, axis=1)) / max(float(normal.sum()), TINY)
+    leaving = 0.5 * moved_away * mobilised * mu * normal_before * slip
     work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, leaving))
     at_once = 1.0
     if increments is not None:

@@ -347,11 +347,11 @@ def test_a_contact_that_moves_has_the_work_of_its_force(formulation, rigid):
 @pytest.mark.parametrize(
     ("body", "options", "slide", "load", "error"),
     [
-        (None, {}, 1.5, 1.0, 0.02),
+        (None, {}, 3.0, 1.0, 0.02),
         (None, {"formulation": "mortar"}, 1.0, 0.1, 0.1),
         ("primary", {"multipliers": "dual"}, 1.5, 1.0, 0.02),
         ("primary", {"multipliers": "dual"}, 1.5, 0.1, 0.1),
-        ("primary", {"multipliers": "standard"}, 3.0, 1.0, 0.05),
+        ("primary", {"multipliers": "standard"}, 3.0, 1.0, 0.02),
         ("secondary", {"multipliers": "dual"}, 1.5, 1.0, 0.02),
     ],
 )
