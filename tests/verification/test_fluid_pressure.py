@@ -45,8 +45,7 @@ def seal(element="quad4", push=-0.02, source="B BOTTOM_LEFT", **options):
 )
 def test_a_flat_seal_opens_at_the_pressure_of_statics(options, element):
     """Tight at 99.9 % of the contact pressure of 10, open at 100.1 %; then the gap is (p - 10) 2 / E."""
-    instants = (1.0, 5.0, 10.99, 11.01, 14.0)
-    for step in fc.solve(seal(element, **options), fc.Ramp(instants, ((0, 0), (30, 30)))):
+    for step in fc.solve(seal(element, **options), fc.Ramp((1.0, 5.0, 10.99, 11.01, 14.0), ((0, 0), (30, 30)))):
         contact, fluid = step.contact["seal"], step.load_factor - 1.0
         if fluid < 10.0:
             assert not contact.fluid_pressure.any()
@@ -64,8 +63,7 @@ def test_a_flat_seal_opens_at_the_pressure_of_statics(options, element):
 
 def test_the_front_stops_where_the_contact_presses_more():
     """A push that grows from left to right, on a soft foundation of strips: fluid comes as far as it is stronger."""
-    model = seal(push=lambda x: -0.004 - 0.01 * x[:, 0])
-    step = fc.solve(model, fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30))))
+    step = fc.solve(seal(push=lambda x: -0.004 - 0.01 * x[:, 0]), fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30))))
     dry, reaches = step[0].contact["seal"], []
     for later, fluid in zip(step[1:], (3.0, 6.0)):
         contact = later.contact["seal"]

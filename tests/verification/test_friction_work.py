@@ -163,8 +163,7 @@ def test_works_add_up_however_few_the_steps(formulation, penalty):
     found = []
     for count in (1, 5):
         mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 9.0), segments=3)
-        model = pressed_spheres(mesh, formulation=formulation, penalty=penalty)
-        steps = fc.solve(model, count)
+        steps = fc.solve(pressed_spheres(mesh, formulation=formulation, penalty=penalty), count)
         found.append(steps[-1].work)
     forces, moved = ([0.0, *(getattr(step, name) for step in steps)] for name in ("reaction", "displacement"))
     work = sum(0.5 * ((p + q) * (v - u)).sum() for p, q, u, v in zip(forces, forces[1:], moved, moved[1:]))
@@ -254,8 +253,7 @@ def test_work_of_friction_between_bodies_does_not_depend_on_the_number_of_steps(
     works = []
     for n, fraction in ((40, 1.0), (5, None), (1, None)):
         bodies = {"SPHHAU": fc.LinearElastic(E=20_000.0, nu=0.3), "SPHBAS": fc.LinearElastic(E=2e6, nu=0.3)}
-        mesh = fc.generate.half_spheres(element, **size)
-        model = pressed_spheres(mesh, 0.5, material=bodies, friction=0.05)
+        model = pressed_spheres(fc.generate.half_spheres(element, **size), 0.5, material=bodies, friction=0.05)
         criteria = fc.Criteria(friction_while_touching=fraction)
         works.append(fc.solve(model, n, criteria=criteria)[-1].work["friction_work"])
     assert works[1:] == [pytest.approx(works[0], rel=error) for error in (0.05, 0.15)]
