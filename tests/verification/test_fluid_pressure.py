@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 from refusals import refused
 
 import fastcontact as fc
@@ -188,12 +188,7 @@ def test_fluid_presses_on_the_part_of_the_secondary_side_that_faces_nothing(opti
     depth, divisions = ((1.0,), (2, 1)) if solid else ((), (1,))
     wide = generate((2.0, *depth, 0.5), (8, *divisions), element, (0.0, *(0.0 for _ in depth), -0.5), name="WIDE")
     small = generate((0.4, *depth, 0.5), (2, *divisions), element, (0.55, *(0.0 for _ in depth), 0.1), name="SMALL")
-    mesh = fc.generate.union(
-        *(fc.generate.renamed(m, lambda g, n=n: f"{n} {g}") for m, n in ((wide, "W"), (small, "S")))
-    )
-    model = elastic_model(
-        mesh, "3d" if solid else "plane_strain", E=E, nu=0.3, **{f"W {bottom}": axes, f"S {top}": axes}
-    )
+    model = elastic_model(united(**{"W ": wide, "S ": small}), E=E, **{f"W {bottom}": axes, f"S {top}": axes})
     model.add_contact("seal", secondary=f"W {top}", primary=f"S {bottom}", **options)
     model.add_fluid_pressure("seal", 2.0, source=f"W {top}")
     seal = fc.solve(model, 1)[-1].contact["seal"]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres, supported, united, with_obstacle
+from models import elastic_model, pressed_spheres, supported, united, with_contact, with_obstacle
 from stepping import Stepping
 
 import fastcontact as fc
@@ -355,26 +355,21 @@ def test_a_contact_that_moves_has_the_work_of_its_force(formulation, rigid):
 )
 def test_a_contact_that_moves_by_more_than_its_width_in_one_step(body, options, slide, load, error):
     """A block is drawn along a cylinder, of which the part `load` is pressed in before: one step has the work of many."""
-    mesh, options = (
-        fc.generate.block((12.0, 2.0), (96, 8), origin=(-6.0, -2.0), name="LOW"),
-        {"friction": 0.3} | options,
-    )
+    mesh = fc.generate.block((12.0, 2.0), (96, 8), origin=(-6.0, -2.0), name="LOW")
     press, low, works = [(0.0, 0.0), (1.0, load), (2.0, 1.0)], "LOW_" if body else "", []
     if body:
         cap = fc.generate.block((3.0, 2.0), (25, 6), origin=(-1.5, 0.0), name="UP")
         x, y = cap.points.T
         mesh = united(LOW_=mesh, UP_=cap.replace(points=np.column_stack([x, y + x**2 * (2.0 - y) / 20.0])))
     for count in (1, 16):
-        model = elastic_model(mesh, "plane_strain", E=1000.0, **{f"{low}BOTTOM": "y"})
-        model.prescribe(f"{low}BOTTOM", x=-slide, ramp=[(0, 0), (1, 0), (2, 1)])
+        model = elastic_model(mesh, **{f"{low}BOTTOM": {"x": -slide, "y": 0.0, "ramp": [(0, 0), (1, 0), (2, 1)]}})
         if body:
-            model.fix("UP_TOP", "x")
-            model.prescribe("UP_TOP", y=-0.05, ramp=press)
+            supported(model, UP_TOP={"x": 0.0, "y": -0.05, "ramp": press})
             sides = ("LOW_TOP", "UP_BOTTOM")[:: -1 if body == "secondary" else 1]
-            model.add_contact("pair", secondary=sides[0], primary=sides[1], **options)
+            with_contact(model, "pair", *sides, friction=0.3, **options)
         else:
-            cylinder = fc.obstacles.Sphere((0.0, 5.0), 5.0)
-            model.add_obstacle("pair", secondary="TOP", obstacle=cylinder, motion={"y": -0.04}, ramp=press, **options)
+            motion = {"motion": {"y": -0.04}, "ramp": press}
+            with_obstacle(model, "pair", "TOP", fc.obstacles.Sphere((0.0, 5.0), 5.0), friction=0.3, **motion, **options)
         steps = fc.solve(model, [1.0, *np.linspace(1.0, 2.0, count + 1)[1:]])
         works.append(sum(step.contact["pair"].dissipation for step in steps[1:]))
     assert works[0] == pytest.approx(works[1], rel=error)
