@@ -103,4 +103,5 @@ def test_the_fuzzer_survives_and_tells_what_a_reader_does(monkeypatch, tmp_path,
     )
     monkeypatch.setenv("PYTHONPATH", str(fake))
     monkeypatch.setenv("FUZZ_SECONDS", "1")
-    assert list(fuzz_run.run([0], 1, one_seed).counts.values()) == [Counter({kind: 1})]
+    found = fuzz_run.run([0], 1, one_seed)
+    assert list(found.counts.values()) == [Counter({kind: 1})]

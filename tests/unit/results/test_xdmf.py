@@ -210,7 +210,8 @@ def test_values_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
 def test_grace_draws_it_and_reads_the_same_numbers(tmp_path: Path) -> None:
     curves = pressure_curves()
     write_agr(tmp_path / "a.agr", curves, subtitle="h = 4 mm", **LABELS)
-    content = draw(tmp_path / "a.agr", "-saveall", str(tmp_path / "saved.agr")).read_bytes()
+    picture = draw(tmp_path / "a.agr", "-saveall", str(tmp_path / "saved.agr"))
+    content = picture.read_bytes()
     assert content.startswith(b"\x89PNG")
     assert len(content) > 3000
     saved = (tmp_path / "saved.agr").read_text("latin-1")
@@ -240,7 +241,8 @@ def test_grace_draws_it_and_reads_the_same_numbers(tmp_path: Path) -> None:
 )
 def test_grace_takes_whatever_comes(curves: list[Curve], text: str, tmp_path: Path) -> None:
     write_agr(tmp_path / "a.agr", curves, title=text, subtitle=text, xlabel=text, ylabel=text)
-    assert len(draw(tmp_path / "a.agr", "-saveall", str(tmp_path / "saved.agr")).read_bytes()) > 2000
+    picture = draw(tmp_path / "a.agr", "-saveall", str(tmp_path / "saved.agr"))
+    assert len(picture.read_bytes()) > 2000
     saved = (tmp_path / "saved.agr").read_text("latin-1")
     assert f'@    title "{escape(text)}"' in saved
     assert len(sets_of(saved)) == len(curves)
