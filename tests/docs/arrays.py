@@ -237,8 +237,7 @@ def values_under(*paths: str) -> list[Any]:
 
 def entries(values: list[Any]) -> list[Entry]:
     """The entries of functions and classes, each once."""
-    found = {(entry.where, entry.name): entry for value in values for entry in of_value(value)}
-    return list(found.values())
+    return list({(entry.where, entry.name): entry for value in values for entry in of_value(value)}.values())
 
 
 def figures(found: list[Entry]) -> str:

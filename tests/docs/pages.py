@@ -69,8 +69,7 @@ def available(name: str) -> bool:
 
 def pages() -> list[Path]:
     """Return the README and all pages of the documentation."""
-    found = [path for path in DOCS.rglob("*.md") if "_build" not in path.parts]
-    return [ROOT / "README.md", *sorted(found)]
+    return [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)]
 
 
 def blocks(page: Path) -> list[Block]:

@@ -35,8 +35,7 @@ def test_files_that_a_page_names_are_there(page):
 
 def test_every_public_name_is_in_the_reference():
     reference = "\n".join(path.read_text(encoding="utf-8") for path in (pages.DOCS / "reference").glob("*.md"))
-    errors = {name for name, value in vars(fc.errors).items() if inspect.isclass(value)}
-    for name in set(fc.__all__) - errors:
+    for name in set(fc.__all__) - {name for name, value in vars(fc.errors).items() if inspect.isclass(value)}:
         assert re.search(
             rf"auto(class|function|module|data):: (fastcontact\.[\w.]*)?{name}$", reference, re.MULTILINE
         ), name
@@ -54,8 +53,7 @@ def test_every_word_of_the_glossary_is_in_the_code_and_has_one_meaning():
 
 
 def test_every_command_is_listed():
-    commands = next(action.choices for action in parser()._actions if action.dest == "command")
-    for name in commands:
+    for name in next(action.choices for action in parser()._actions if action.dest == "command"):
         assert f"| `{name}" in text("reference/commands.md"), name
 
 

@@ -34,8 +34,7 @@ def test_examples_of_a_module(path, tmp_path, monkeypatch):
 def public_values():
     """Yield (name, value): public functions, the classes that users make or get, and what builds a model."""
     for module in (fc, fc.analytic, fc.generate, fc.obstacles, fc.plot):
-        values = {name: getattr(module, name) for name in module.__all__}
-        for name, value in values.items():
+        for name, value in {name: getattr(module, name) for name in module.__all__}.items():
             made_by_functions = module is fc.analytic or getattr(value, "_is_protocol", False)
             if inspect.isfunction(value) or (inspect.isclass(value) and not made_by_functions):
                 yield f"{module.__name__}.{name}", value

@@ -57,8 +57,7 @@ def test_a_block_that_needs_something_is_told_so_in_the_text(page):
 
 def test_the_gallery_asserts_a_number_for_every_picture():
     page = pages.DOCS / "gallery.md"
-    text = page.read_text(encoding="utf-8")
-    sections = text.split("\n## ")[1:]
+    sections = page.read_text(encoding="utf-8").split("\n## ")[1:]
     assert 8 <= len(sections) == len(pages.pictures(page))
     for section in sections:
         programs = section.count("```python") - section.count("<!-- needs:")

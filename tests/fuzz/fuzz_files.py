@@ -53,8 +53,7 @@ def make_file(number: int, seed: int, seeds: dict[str, Path], folder: Path, outs
         target.write_text(changed, encoding="utf-8")
     else:
         others = [seeds[other].read_bytes() for other in _near(name, seeds)]
-        data = fuzz_bytes.damaged(source.read_bytes(), random, others)
-        target.write_bytes(data[: 1 << 22])
+        target.write_bytes(fuzz_bytes.damaged(source.read_bytes(), random, others)[: 1 << 22])
     return name, target
 
 

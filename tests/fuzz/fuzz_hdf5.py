@@ -15,8 +15,7 @@ def damage(path: Path, outside: Path, random: np.random.Generator) -> None:
     for _ in range(1 + int(random.integers(3))):
         with h5py.File(path, "r+") as file:
             groups, datasets = _objects(file)
-            change = CHANGES[int(random.integers(len(CHANGES)))]
-            change(file, groups, datasets, outside, random)
+            CHANGES[int(random.integers(len(CHANGES)))](file, groups, datasets, outside, random)
 
 
 def _objects(file: Any) -> tuple[list[Any], list[Any]]:
@@ -87,8 +86,7 @@ def _values(file: Any, groups: list[Any], datasets: list[Any], outside: Path, ra
     if not found:
         return
     dataset = _any(found, random)
-    values = dataset[()]
-    flat = np.atleast_1d(values).reshape(-1)
+    flat = np.atleast_1d(dataset[()]).reshape(-1)
     for _ in range(int(random.integers(1, 5))):
         if flat.dtype.kind == "f":
             new = _any([np.nan, np.inf, -np.inf, 1e308, -1.0, 0.0, 5e-324], random)
@@ -111,11 +109,9 @@ def _resize(file: Any, groups: list[Any], datasets: list[Any], outside: Path, ra
 
 
 def _attribute(file: Any, groups: list[Any], datasets: list[Any], outside: Path, random: np.random.Generator) -> None:
-    holders = [item for item in [*groups, *datasets] if len(item.attrs)]
-    holder = _any(holders, random)
+    holder = _any([item for item in [*groups, *datasets] if len(item.attrs)], random)
     key = _any(sorted(holder.attrs), random)
-    kind = int(random.integers(3))
-    if kind == 0:
+    if int(random.integers(3)) == 0:
         del holder.attrs[key]
         return
     wild = [
@@ -186,8 +182,7 @@ def _rename(file: Any, groups: list[Any], datasets: list[Any], outside: Path, ra
 
 
 def _delete(file: Any, groups: list[Any], datasets: list[Any], outside: Path, random: np.random.Generator) -> None:
-    item = _any([*groups[1:], *datasets], random)
-    del file[item.name]
+    del file[_any([*groups[1:], *datasets], random).name]
 
 
 def _exchange(file: Any, groups: list[Any], datasets: list[Any], outside: Path, random: np.random.Generator) -> None:

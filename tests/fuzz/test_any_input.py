@@ -71,8 +71,7 @@ def test_any_value_at_any_place_of_a_case(case, place, key, value):
     else:
         holder[key] = value
     path = folder / "changed.toml"
-    text = dump(data)
-    path.write_text(text, encoding="utf-8", errors="replace")
+    path.write_text(dump(data), encoding="utf-8", errors="replace")
     kind, message = outcome(path)
     assert kind in GOOD, message
 

@@ -57,8 +57,7 @@ def told(case, path):
             for step in results:
                 assert np.shape(step.displacement) == case.mesh.points.shape
         with fc.ResultWriter(path, case.model, resume=True) as out:
-            steps = fc.solve_steps(case.model, case.ramp, criteria=case.criteria, resume=out.done)
-            for step in steps:
+            for step in fc.solve_steps(case.model, case.ramp, criteria=case.criteria, resume=out.done):
                 out.write(step)
     except fc.FastcontactError as error:
         return None if "\n" not in str(error) else f"several lines: {error}"

@@ -61,8 +61,7 @@ def ramp(random: Random) -> fc.Ramp:
     """Return one to three steps up, or a step up and one half back."""
     if random.random() < 0.15:
         return fc.Ramp((1.0, 2.0), ((0.0, 0.0), (1.0, 1.0), (2.0, 0.5)))
-    n = int(random.choice([1, 1, 2, 3]))
-    return fc.linear_ramp(n)
+    return fc.linear_ramp(int(random.choice([1, 1, 2, 3])))
 
 
 def solving(random: Random) -> dict[str, Any]:

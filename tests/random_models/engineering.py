@@ -227,8 +227,7 @@ def coupled(random: Random) -> Draft:
     """A block on another one, its top coupled with a handle that is pushed and turned."""
     kinematics, dim, length = space(random)
     at, down = somewhere(random, dim), pressed_by(random, length)
-    bodies = stack(random, dim, length)
-    mesh = fc.generate.union(*(body.mesh(at) for body in bodies))
+    mesh = fc.generate.union(*(body.mesh(at) for body in stack(random, dim, length)))
     handle = at.places(np.array([[*np.full(dim - 1, 0.5 * length), 1.5 * length]]))[0]
     mesh = fc.generate.with_reference_points(mesh, {"HANDLE": tuple(handle)})
     draft = begun(random, [mesh], kinematics, ["B0", "B1"], length)

@@ -90,8 +90,7 @@ def sphere(random: Random) -> Draft:
         block_size=(0.8 * R, 0.5 * R),
     )  # fmt: skip
     draft = begun(random, mesh, "3d", ["SPHERE", "BLOCK"], R, element)
-    model = draft.model
-    supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -part * R})
+    supported(draft.model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -part * R})
     add_contact(random, draft, ("CONT_SPHERE", "CONT_BLOCK"), part * R)
     return draft
 

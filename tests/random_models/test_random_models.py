@@ -21,8 +21,7 @@ SOLVED = 0.85
 
 def check(seeds):
     rows = [outcome(seed) for seed in seeds]
-    findings = [row for row in rows if row["outcome"] not in ("result", "told", "own error")]
-    assert not findings
+    assert not [row for row in rows if row["outcome"] not in ("result", "told", "own error")]
     assert sum(row["outcome"] == "result" for row in rows) >= SOLVED * len(rows)
     return rows
 

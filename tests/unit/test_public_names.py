@@ -174,8 +174,7 @@ def test_the_version_is_the_same_everywhere(project, root):
 
 def test_figures_beside_others_are_those_of_the_benchmarks(root):
     """Each number of seconds that README gives for another program stands on the page of the benchmarks."""
-    readme = (root / "README.md").read_text(encoding="utf-8")
-    table = readme.split("## Other programs")[1].split("## ")[0]
+    table = (root / "README.md").read_text(encoding="utf-8").split("## Other programs")[1].split("## ")[0]
     measured = (root / "bench" / "README.md").read_text(encoding="utf-8")
     figures = re.findall(r"\b(\d+(?:\.\d+)?) s\b", table)
     assert len(figures) >= 6

@@ -33,13 +33,11 @@ def test_uniform_pressure_gives_a_uniform_stress(element, kinematics):
 
 @pytest.mark.parametrize("element", SOLID)
 def test_uniform_pressure_gives_a_uniform_stress_in_3d(element):
-    mesh = fc.generate.box((2.0, 3.0, 1.0), (2, 2, 2), element)
-    model = elastic_model(mesh, "3d", XMIN="x", YMIN="y", ZMIN="z")
+    model = elastic_model(fc.generate.box((2.0, 3.0, 1.0), (2, 2, 2), element), "3d", XMIN="x", YMIN="y", ZMIN="z")
     model.add_pressure("XMAX", 2.0)
     model.add_traction("YMAX", y=3.0)
     model.add_force("ZMAX", z=-4.0 * 6.0)
-    last = fc.solve(model, 1)[-1]
-    assert np.abs(last.stress - [-2.0, 3.0, -4.0, 0.0, 0.0, 0.0]).max() < 2e-12 * 4.0
+    assert np.abs(fc.solve(model, 1)[-1].stress - [-2.0, 3.0, -4.0, 0.0, 0.0, 0.0]).max() < 2e-12 * 4.0
 
 
 def ring(element, n):
@@ -158,8 +156,7 @@ def test_a_relation_with_a_right_hand_side_and_its_reactions():
 
 
 def test_loads_with_their_own_histories():
-    mesh = fc.generate.block((2.0, 1.0), (3, 2), "quad8")
-    model = elastic_model(mesh, "plane_strain", BOTTOM="y", LEFT="x")
+    model = elastic_model(fc.generate.block((2.0, 1.0), (3, 2), "quad8"), "plane_strain", BOTTOM="y", LEFT="x")
     model.add_pressure("TOP", 5.0, ramp=[(0, 0), (1, 1), (3, 1)])
     model.add_pressure("RIGHT", 2.0, ramp=[(0, 0), (1, 0), (2, 1), (3, 0)])
     steps = fc.solve(model, fc.Ramp((0.5, 1.0, 2.0, 3.0), ((0, 0), (3, 7))))
@@ -234,8 +231,7 @@ def test_a_load_lost_in_round_off_is_told_in_numbers(request):
 def test_a_body_that_nothing_loads_has_no_determined_position(friction):
     """It lies between two others without touching them; pushed by one of them, it has one."""
     for push, free in ((0.0, True), (0.3, False)):
-        model = floating_block(push, friction)
-        last, texts = last_step(model, about="nothing determines the position")
+        last, texts = last_step(floating_block(push, friction), about="nothing determines the position")
         assert len(texts) == free
         assert last.iterations["regularised"]["undetermined"] == (
             {"body 'UPPER'": ["translation along y"]} if free else {}
@@ -314,8 +310,7 @@ def test_a_body_pulled_away_is_told_clearly():
 @pytest.mark.filterwarnings("ignore:contact .* has opened again at the end")
 def test_a_force_goes_and_the_contact_force_with_it():
     mesh = fc.generate.half_spheres("tri3", size=5.0)
-    model = driven_by_force(mesh, "node_to_segment", 2e5, ramp=[(0, 0), (0.5, 1), (1, 0)])
-    steps = fc.solve(model, fc.linear_ramp(4))
+    steps = fc.solve(driven_by_force(mesh, "node_to_segment", 2e5, ramp=[(0, 0), (0.5, 1), (1, 0)]), fc.linear_ramp(4))
     forces = [step.contact["hertz"].force[1] for step in steps]
     assert forces[:3] == pytest.approx([-1e5, -2e5, -1e5], rel=1e-9)
     assert abs(forces[3]) < 1e-9 * 2e5
@@ -369,8 +364,7 @@ def test_a_sub_model_follows_the_stages_of_the_global_model():
 
     def model(height, divisions):
         model = elastic_model(fc.generate.block((1.0, height), (4, divisions), "quad8"), "plane_strain", E=100.0)
-        plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-        return with_obstacle(model, "plane", "BOTTOM", plane, friction=0.3)
+        return with_obstacle(model, "plane", "BOTTOM", fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)), friction=0.3)
 
     block, half = model(1.0, 4), model(0.5, 2)
     heights = np.array([(0.5, -0.01), (1.0, -0.008)])  # an array of pairs serves as well as a list

@@ -76,8 +76,7 @@ def test_a_force_takes_the_way_of_the_displacement(kinematics: str, element: str
 @pytest.mark.parametrize("strain", ["small", "finite"])
 def test_a_force_beyond_the_limit_load_is_told_as_such(strain: str) -> None:
     """A strip without hardening bears 2 / sqrt(3) of its yield stress."""
-    mesh = fc.generate.block((1.0, 1.0), (2, 2))
-    model = made_of(mesh, "plane_strain", PERFECT, strain=strain, BOTTOM="y", LEFT="x")
+    model = made_of(fc.generate.block((1.0, 1.0), (2, 2)), "plane_strain", PERFECT, strain=strain, BOTTOM="y", LEFT="x")
     model.add_traction("TOP", y=2.0 * PERFECT.yield_stress)
     with pytest.raises(
         fc.ConvergenceError, match=r"largest plastic strain is .* may not carry larger forces: prescribe"
@@ -90,8 +89,7 @@ def test_sides_that_overlap_at_the_start_are_told_where_the_motion_is_along_them
     """As those of a snap fit that is pushed on."""
     stub = fc.generate.block((1.0, 2.0), (2, 4), name="STUB")
     cap = fc.generate.block((1.0, 2.0), (2, 4), origin=(1.0 + distance, 0.5), name="CAP")
-    motion = {"x": 0.0, "y": -0.5}
-    model = made_of(joined({"0": stub, "1": cap}), "plane_strain", STEEL, LEFT0="xy", RIGHT1=motion)
+    model = made_of(joined({"0": stub, "1": cap}), "plane_strain", STEEL, LEFT0="xy", RIGHT1={"x": 0.0, "y": -0.5})
     model.add_contact("bead", secondary="LEFT1", primary="RIGHT0")
     assert len(last_step(model, about="begins with a penetration of 0.05 at")[1]) == (distance < 0.0)
 

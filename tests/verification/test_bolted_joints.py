@@ -107,8 +107,7 @@ def test_a_bolted_joint_is_two_springs(pull, formulation, solver):
     kb = E A / L of the bolt, kp that of the plates, twice as wide: shares of 1/3 and 2/3 (textbook joint diagram, as in
     VDI 2230).
     """
-    model = joint(pull, formulation)
-    tight, pulled = fc.solve(model, [1.0, 2.0], linear_solver=solver, linear_tolerance=1e-12)
+    tight, pulled = fc.solve(joint(pull, formulation), [1.0, 2.0], linear_solver=solver, linear_tolerance=1e-12)
     assert tight.pretension["bolt"]["force"] == pytest.approx(FORCE, rel=1e-8)
     assert tight.contact["joint"].force[1] == pytest.approx(FORCE, rel=1e-8)
     assert tight.pretension["bolt"]["shortening"] == pytest.approx(FORCE * LENGTH / E * (1.0 + 0.5), rel=1e-8)

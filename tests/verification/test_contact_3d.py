@@ -56,8 +56,7 @@ def is_uniform(last, pressure, tolerance=1e-10):
     + [(e, "continuous") for e in (*LINEAR, *QUADRATIC, "mixed", "mixed quadratic")],
 )
 def test_matching_meshes_transmit_a_uniform_pressure_exactly(element, formulation, swap):
-    last = fc.solve(pressed(two_cubes(element, element), formulation, swap), fc.linear_ramp(2))[-1]
-    is_uniform(last, E * 0.01 / 2.0)
+    is_uniform(fc.solve(pressed(two_cubes(element, element), formulation, swap), fc.linear_ramp(2))[-1], E * 0.01 / 2.0)
 
 
 # Where they make sense: two points do not determine quadratic fields, some corners have no area.
@@ -101,8 +100,7 @@ def on_rigid_plate(element, formulation, **sizes):
     """The sphere on a plate all of whose nodes are held: half of two equal spheres."""
     sphere = sphere_octant(element, **sizes)
     plate = box((30.0, 10.0, 30.0), (1, 1, 1), "hex8", (0.0, -10.0, 0.0), name="PLATE")
-    model = sphere_model(union(sphere, renamed(plate, {"YMAX": "CONT_BLOCK"})), formulation)
-    return supported(model, PLATE="xyz")
+    return supported(sphere_model(union(sphere, renamed(plate, {"YMAX": "CONT_BLOCK"})), formulation), PLATE="xyz")
 
 
 def on_elastic_block(element, formulation, contact_size, swap=False, **options):
@@ -158,8 +156,7 @@ ON_A_BLOCK = [("node_to_segment", False, *DIRECT), ("continuous", False, *DIRECT
 @pytest.mark.parametrize(("formulation", "swap", "solver", "tolerance", "options"), first_of(4, ON_A_BLOCK))
 def test_a_sphere_on_an_elastic_block_agrees_with_hertz_at_equal_force(formulation, swap, solver, tolerance, options):
     model = on_elastic_block("hex8", formulation, 1.4, swap, **options)
-    contact = fc.solve(model, fc.linear_ramp(1), linear_solver=solver)[-1].contact["hertz"]
-    force, pressure, radius = measured(contact)
+    force, pressure, radius = measured(fc.solve(model, fc.linear_ramp(1), linear_solver=solver)[-1].contact["hertz"])
     hertz = fc.analytic.hertz_point(E1=20_000.0, nu1=0.3, R1=50.0, E2=20_000.0, nu2=0.3, force=force)
     assert pressure == pytest.approx(hertz.pressure_max, rel=tolerance)
     assert radius == pytest.approx(hertz.radius, rel=tolerance)

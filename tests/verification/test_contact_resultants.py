@@ -20,8 +20,7 @@ ELEMENTS = ("tri3", "quad4", "tri6", "quad8")
 
 def column(element="quad4", divisions=(4, 2), tilt=0.0, kinematics="plane_stress", **options):
     """Return a block of width 2 on a rigid plane; nu = 0, so that each column of it is a spring."""
-    mesh = fc.generate.block((2.0, HEIGHT), divisions, element)
-    model = elastic_model(mesh, kinematics, E=E, nu=0.0)
+    model = elastic_model(fc.generate.block((2.0, HEIGHT), divisions, element), kinematics, E=E, nu=0.0)
     model.add_obstacle(
         "plane", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0)),
         formulation="continuous", **options,
@@ -152,8 +151,7 @@ def test_a_block_that_slides_wears_by_pressure_times_way(element, steps):
     model = column(element)
     pressed(model, 0.01, ramp=RAMP_DOWN)
     model.prescribe("TOP", x=0.3, ramp=RAMP_ALONG)
-    found = fc.solve(model, [1.0, *np.linspace(1.0, 9.0, steps + 1)[1:]])
-    depth = fc.wear(model, found, "plane", WEAR)
+    depth = fc.wear(model, fc.solve(model, [1.0, *np.linspace(1.0, 9.0, steps + 1)[1:]]), "plane", WEAR)
     assert depth.shape == (steps + 1, len(model.mesh.points_of("BOTTOM")))
     assert depth[0] == pytest.approx(0.0, abs=1e-18)
     assert depth[-1] == pytest.approx(WEAR * 5.0 * 0.3, rel=1e-8)
@@ -397,8 +395,7 @@ def test_a_shoe_wears_in_until_it_presses_evenly(formulation):
 def test_wear_told_afterwards_is_what_the_analysis_wore_off():
     model = shoe()
     steps = fc.solve(model, [1.0, 2.0, 3.0, 4.0])
-    told = fc.wear(model, steps, "sole", COEFFICIENT)
-    assert told[-1] == pytest.approx(steps[-1].contact["sole"].wear, rel=1e-12)
+    assert fc.wear(model, steps, "sole", COEFFICIENT)[-1] == pytest.approx(steps[-1].contact["sole"].wear, rel=1e-12)
     without = fc.solve(shoe(wear=None), [1.0, 2.0, 3.0, 4.0])
     assert without[-1].contact["sole"].wear is None
     assert without[-1].contact["sole"].pressure_max > 1.01 * steps[-1].contact["sole"].pressure_max

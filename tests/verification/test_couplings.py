@@ -166,8 +166,7 @@ def test_what_is_refused(call, said):
 
 
 def test_nothing_turns_in_axisymmetry():
-    mesh = fc.generate.with_reference_points(fc.generate.block(), {"REF": (0.0, 2.0)})
-    model = fc.Model(mesh, "axisymmetric")
+    model = fc.Model(fc.generate.with_reference_points(fc.generate.block(), {"REF": (0.0, 2.0)}), "axisymmetric")
     with pytest.raises(fc.ModelError, match=r"in axisymmetry there are no rotations; use couple\('TOP', 'y'\)"):
         model.add_coupling("REF", "TOP")
     refused(fc.ModelError, "a moment cannot act on an axisymmetric model", model.add_moment, "TOP", z=1.0)

@@ -60,8 +60,7 @@ def test_a_force_does_what_its_displacement_does(kinematics, element, formulatio
 def test_a_force_does_what_its_displacement_does_in_three_dimensions(formulation, element, solver):
     moved = fc.solve(box_under_a_ball(element, motion={"z": -0.02}, formulation=formulation), 1)[-1]
     force = {"z": float(moved.contact["ball"].force[2])}
-    model = box_under_a_ball(element, force=force, formulation=formulation)
-    same(moved, fc.solve(model, 1, linear_solver=solver)[-1])
+    same(moved, fc.solve(box_under_a_ball(element, force=force, formulation=formulation), 1, linear_solver=solver)[-1])
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -108,8 +107,7 @@ def test_a_body_that_only_obstacles_hold():
     """A loose block on a fixed floor under a pushed ball: the force goes through."""
     model = elastic_model(fc.generate.block((2.0, 1.0), (16, 8), "quad4", origin=(-1.0, -1.0)), BOTTOM="x")
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, -1.0), (0.0, 1.0)))
-    ball = fc.obstacles.Sphere((0.0, 3.1), 3.0)
-    model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -10.0})
+    model.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 3.1), 3.0), force={"y": -10.0})
     contact = fc.solve(model, 1)[-1].contact
     assert contact["ball"].force[1] == pytest.approx(-10.0, rel=1e-10)
     assert contact["floor"].force[1] == pytest.approx(10.0, rel=1e-10)
@@ -166,8 +164,7 @@ def test_from_case_file_to_result_file(tmp_path):
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     down = {"y": float(contact.obstacle_displacement[1])}
     moved.add_obstacle("plane", secondary="CONT1", obstacle=plane, motion=down)
-    there = fc.solve(moved, 1)[-1].contact["plane"]
-    assert there.force[1] == pytest.approx(-2.0e5, rel=1e-8)
+    assert fc.solve(moved, 1)[-1].contact["plane"].force[1] == pytest.approx(-2.0e5, rel=1e-8)
     summary = json.loads(json.dumps(summarise(case, steps[-1], [step_entry(step) for step in steps], {}, [])))
     assert summary["contact"]["plane"]["obstacle_displacement"] == contact.obstacle_displacement.tolist()
     assert any("obstacle 'plane' is displaced by (0, -" in line for line in lines(summary))
@@ -236,8 +233,7 @@ def test_a_twisted_ball_slides_with_the_torque_of_full_slip(formulation, driving
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 @pytest.mark.filterwarnings("ignore:contact 'ball' has only")
 def test_without_friction_a_ball_may_turn_as_it_likes(formulation):
-    model = twisted_ball(formulation, friction=0.0, angle=50.0)
-    still, turned = fc.solve(model, [1.0, 9.0])
+    still, turned = fc.solve(twisted_ball(formulation, friction=0.0, angle=50.0), [1.0, 9.0])
     assert turned.displacement == pytest.approx(still.displacement, abs=1e-9)
     assert turned.contact["ball"].torque == pytest.approx(0.0, abs=1e-9)
     assert turned.contact["ball"].obstacle_angle == 50.0
@@ -266,8 +262,7 @@ def spun_disc(
 )
 def test_a_spun_disc_slides_everywhere(formulation, element):
     """All points of it have the same arm, its radius: the torque of full slip is mu P R, with every law of pressure."""
-    steps = fc.solve(spun_disc(formulation, element=element), [1.0, 5.0, 9.0])
-    contact = steps[-1].contact["disc"]
+    contact = fc.solve(spun_disc(formulation, element=element), [1.0, 5.0, 9.0])[-1].contact["disc"]
     assert contact.torque == pytest.approx(-FRICTION * 5.0 * normal_forces(contact).sum(), rel=2e-3)
     assert contact.dissipation == pytest.approx(-contact.torque * 0.25, rel=2e-3)
     # The disc turns clockwise and drags the surface below it to the left.

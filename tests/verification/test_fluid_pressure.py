@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 from refusals import refused
 
 import fastcontact as fc
@@ -45,8 +45,7 @@ def seal(element="quad4", push=-0.02, source="B BOTTOM_LEFT", **options):
 )
 def test_a_flat_seal_opens_at_the_pressure_of_statics(options, element):
     """Tight at 99.9 % of the contact pressure of 10, open at 100.1 %; then the gap is (p - 10) 2 / E."""
-    instants = (1.0, 5.0, 10.99, 11.01, 14.0)
-    for step in fc.solve(seal(element, **options), fc.Ramp(instants, ((0, 0), (30, 30)))):
+    for step in fc.solve(seal(element, **options), fc.Ramp((1.0, 5.0, 10.99, 11.01, 14.0), ((0, 0), (30, 30)))):
         contact, fluid = step.contact["seal"], step.load_factor - 1.0
         if fluid < 10.0:
             assert not contact.fluid_pressure.any()
@@ -64,8 +63,7 @@ def test_a_flat_seal_opens_at_the_pressure_of_statics(options, element):
 
 def test_the_front_stops_where_the_contact_presses_more():
     """A push that grows from left to right, on a soft foundation of strips: fluid comes as far as it is stronger."""
-    model = seal(push=lambda x: -0.004 - 0.01 * x[:, 0])
-    step = fc.solve(model, fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30))))
+    step = fc.solve(seal(push=lambda x: -0.004 - 0.01 * x[:, 0]), fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30))))
     dry, reaches = step[0].contact["seal"], []
     for later, fluid in zip(step[1:], (3.0, 6.0)):
         contact = later.contact["seal"]
@@ -190,12 +188,7 @@ def test_fluid_presses_on_the_part_of_the_secondary_side_that_faces_nothing(opti
     depth, divisions = ((1.0,), (2, 1)) if solid else ((), (1,))
     wide = generate((2.0, *depth, 0.5), (8, *divisions), element, (0.0, *(0.0 for _ in depth), -0.5), name="WIDE")
     small = generate((0.4, *depth, 0.5), (2, *divisions), element, (0.55, *(0.0 for _ in depth), 0.1), name="SMALL")
-    mesh = fc.generate.union(
-        *(fc.generate.renamed(m, lambda g, n=n: f"{n} {g}") for m, n in ((wide, "W"), (small, "S")))
-    )
-    model = elastic_model(
-        mesh, "3d" if solid else "plane_strain", E=E, nu=0.3, **{f"W {bottom}": axes, f"S {top}": axes}
-    )
+    model = elastic_model(united(**{"W ": wide, "S ": small}), E=E, **{f"W {bottom}": axes, f"S {top}": axes})
     model.add_contact("seal", secondary=f"W {top}", primary=f"S {bottom}", **options)
     model.add_fluid_pressure("seal", 2.0, source=f"W {top}")
     seal = fc.solve(model, 1)[-1].contact["seal"]

@@ -76,8 +76,7 @@ def test_two_geometry_updates_reproduce_code_aster(letter, tolerance, meshes, co
 def test_converged_geometry_does_not_depend_on_the_number_of_steps(letter, meshes, forma04):
     model = forma04(meshes[letter])
     one, twenty = (fc.solve(model, fc.linear_ramp(n))[-1] for n in (1, 20))
-    point = model.mesh.point("C1")
-    assert twenty.stress[point, 1] == pytest.approx(CONVERGED[letter], rel=1e-8)
+    assert twenty.stress[model.mesh.point("C1"), 1] == pytest.approx(CONVERGED[letter], rel=1e-8)
     assert np.linalg.norm(twenty.contact["hertz"].force) == pytest.approx(FORCE_OF_CODE_ASTER[letter], rel=2e-9)
     assert np.abs(one.displacement - twenty.displacement).max() < 1e-8 * np.abs(twenty.displacement).max()
     assert np.abs(one.stress - twenty.stress).max() < 1e-8 * np.abs(twenty.stress).max()

@@ -145,12 +145,10 @@ def test_distance_angle_and_groups():
     mesh = union(lower, upper)
     assert len(fc.find_contacts(mesh)) == 0
     assert fc.find_contacts(mesh, distance=1.5)[0].gap == pytest.approx((1.5, 1.5))
-    turned = fc.generate.transformed(mesh, rotate=30.0)
-    assert fc.find_contacts(turned, distance=1.5)[0].facets == (2, 2)
+    assert fc.find_contacts(fc.generate.transformed(mesh, rotate=30.0), distance=1.5)[0].facets == (2, 2)
     leaning = union(lower, fc.generate.transformed(upper, rotate=20.0))
     assert [len(fc.find_contacts(leaning, distance=3.0, angle=angle)) for angle in (15.0, 25.0)] == [0, 1]
-    close = fc.find_contacts(mesh, distance=1.5, groups=["UP", "LOW"])
-    assert close[0].bodies == ("UP", "LOW")
+    assert fc.find_contacts(mesh, distance=1.5, groups=["UP", "LOW"])[0].bodies == ("UP", "LOW")
     with pytest.raises(fc.ContactError, match=r"nearest are 1.5 apart; give distance = 1.65 or more"):
         fc.Model(mesh, "plane_strain").add_contacts(distance=0.1)
     with pytest.raises(fc.ContactError, match="the mesh is one body"):
@@ -206,8 +204,7 @@ def test_the_table_and_the_picture_of_the_command(element, tmp_path, capsys):
     mesh = stacked(element, 2, 3)
     fc.write_mesh(path, fc.Mesh(mesh.points, mesh.solids))
     assert main(["info", str(path), "--contacts", "--png", str(picture)]) == 0
-    shown = capsys.readouterr().out.splitlines()
-    assert shown[1].split()[:7] == ["body", "2", "on", "body", "1", "body", "2"]
+    assert capsys.readouterr().out.splitlines()[1].split()[:7] == ["body", "2", "on", "body", "1", "body", "2"]
     assert picture.read_bytes()[:4] == b"\x89PNG"
     assert fc.plot.contacts(fc.find_contacts(mesh)).get_title() == "1 contact"
 

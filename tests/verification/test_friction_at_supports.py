@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from models import elastic_model, last_step, supported, united, with_obstacle
+from refusals import refused
 
 import fastcontact as fc
 from fastcontact.analysis.convergence_messages import friction_exceeded
@@ -163,8 +164,8 @@ def test_the_required_friction_is_that_of_the_elastic_pressures():
 
 
 def test_rigid_bodies_give_a_bound_of_the_required_friction_with_multigrid():
-    with pytest.raises(fc.ConvergenceError, match=r"coefficient of at least 0\.5 where the largest is 0\.3\b"):
-        fc.solve(pushed(0.5), [1.0, 2.0], linear_solver="amg")
+    text = r"coefficient of at least 0\.5 where the largest is 0\.3\b"
+    refused(fc.ConvergenceError, text, fc.solve, pushed(0.5), [1.0, 2.0], linear_solver="amg")
 
 
 def test_a_hub_that_slides_on_its_shaft_is_told_as_such():
@@ -177,10 +178,8 @@ def test_a_hub_that_slides_on_its_shaft_is_told_as_such():
     pressing = fc.solve(model, [1.0])[-1].contact["fit"].normal_force
     area = np.pi * (60.0**2 - 20.0**2)
     model.add_traction("H_TOP", y=1.04 * 0.15 * pressing / area, ramp=[(0, 0), (1, 0), (2, 1)])
-    with pytest.raises(
-        fc.ConvergenceError, match=r"friction cannot hold body 'H_HUB' .*of about 0\.15\d where .* is 0\.15\b"
-    ):
-        fc.solve(model, [1.0, 2.0])
+    text = r"friction cannot hold body 'H_HUB' .*of about 0\.15\d where .* is 0\.15\b"
+    refused(fc.ConvergenceError, text, fc.solve, model, [1.0, 2.0])
 
 
 @pytest.mark.parametrize("angle", [0.2, 0.44, 0.7])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, pressed_spheres, supported, united, with_obstacle
+from models import elastic_model, pressed_spheres, supported, united, with_contact, with_obstacle
 from stepping import Stepping
 
 import fastcontact as fc
@@ -163,8 +163,7 @@ def test_works_add_up_however_few_the_steps(formulation, penalty):
     found = []
     for count in (1, 5):
         mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 9.0), segments=3)
-        model = pressed_spheres(mesh, formulation=formulation, penalty=penalty)
-        steps = fc.solve(model, count)
+        steps = fc.solve(pressed_spheres(mesh, formulation=formulation, penalty=penalty), count)
         found.append(steps[-1].work)
     forces, moved = ([0.0, *(getattr(step, name) for step in steps)] for name in ("reaction", "displacement"))
     work = sum(0.5 * ((p + q) * (v - u)).sum() for p, q, u, v in zip(forces, forces[1:], moved, moved[1:]))
@@ -254,8 +253,7 @@ def test_work_of_friction_between_bodies_does_not_depend_on_the_number_of_steps(
     works = []
     for n, fraction in ((40, 1.0), (5, None), (1, None)):
         bodies = {"SPHHAU": fc.LinearElastic(E=20_000.0, nu=0.3), "SPHBAS": fc.LinearElastic(E=2e6, nu=0.3)}
-        mesh = fc.generate.half_spheres(element, **size)
-        model = pressed_spheres(mesh, 0.5, material=bodies, friction=0.05)
+        model = pressed_spheres(fc.generate.half_spheres(element, **size), 0.5, material=bodies, friction=0.05)
         criteria = fc.Criteria(friction_while_touching=fraction)
         works.append(fc.solve(model, n, criteria=criteria)[-1].work["friction_work"])
     assert works[1:] == [pytest.approx(works[0], rel=error) for error in (0.05, 0.15)]
@@ -357,26 +355,21 @@ def test_a_contact_that_moves_has_the_work_of_its_force(formulation, rigid):
 )
 def test_a_contact_that_moves_by_more_than_its_width_in_one_step(body, options, slide, load, error):
     """A block is drawn along a cylinder, of which the part `load` is pressed in before: one step has the work of many."""
-    mesh, options = (
-        fc.generate.block((12.0, 2.0), (96, 8), origin=(-6.0, -2.0), name="LOW"),
-        {"friction": 0.3} | options,
-    )
+    mesh = fc.generate.block((12.0, 2.0), (96, 8), origin=(-6.0, -2.0), name="LOW")
     press, low, works = [(0.0, 0.0), (1.0, load), (2.0, 1.0)], "LOW_" if body else "", []
     if body:
         cap = fc.generate.block((3.0, 2.0), (25, 6), origin=(-1.5, 0.0), name="UP")
         x, y = cap.points.T
         mesh = united(LOW_=mesh, UP_=cap.replace(points=np.column_stack([x, y + x**2 * (2.0 - y) / 20.0])))
     for count in (1, 16):
-        model = elastic_model(mesh, "plane_strain", E=1000.0, **{f"{low}BOTTOM": "y"})
-        model.prescribe(f"{low}BOTTOM", x=-slide, ramp=[(0, 0), (1, 0), (2, 1)])
+        model = elastic_model(mesh, **{f"{low}BOTTOM": {"x": -slide, "y": 0.0, "ramp": [(0, 0), (1, 0), (2, 1)]}})
         if body:
-            model.fix("UP_TOP", "x")
-            model.prescribe("UP_TOP", y=-0.05, ramp=press)
+            supported(model, UP_TOP={"x": 0.0, "y": -0.05, "ramp": press})
             sides = ("LOW_TOP", "UP_BOTTOM")[:: -1 if body == "secondary" else 1]
-            model.add_contact("pair", secondary=sides[0], primary=sides[1], **options)
+            with_contact(model, "pair", *sides, friction=0.3, **options)
         else:
-            cylinder = fc.obstacles.Sphere((0.0, 5.0), 5.0)
-            model.add_obstacle("pair", secondary="TOP", obstacle=cylinder, motion={"y": -0.04}, ramp=press, **options)
+            motion = {"motion": {"y": -0.04}, "ramp": press}
+            with_obstacle(model, "pair", "TOP", fc.obstacles.Sphere((0.0, 5.0), 5.0), friction=0.3, **motion, **options)
         steps = fc.solve(model, [1.0, *np.linspace(1.0, 2.0, count + 1)[1:]])
         works.append(sum(step.contact["pair"].dissipation for step in steps[1:]))
     assert works[0] == pytest.approx(works[1], rel=error)

@@ -103,8 +103,7 @@ def test_uniform_flux_of_other_formulations_and_by_multigrid():
 
 def cylinder_wall(element, count, k=15.0):
     mesh = fc.generate.block((1.0, 0.2), (count, 1), element, (1.0, 0.0))
-    model = made_of(mesh, "axisymmetric", fc.LinearElastic(E=1.0, nu=0.3, conductivity=k), BOTTOM="y")
-    return mesh, model
+    return mesh, made_of(mesh, "axisymmetric", fc.LinearElastic(E=1.0, nu=0.3, conductivity=k), BOTTOM="y")
 
 
 def test_cylinder_wall_has_the_logarithmic_profile():
@@ -133,8 +132,7 @@ def test_wall_between_films_with_a_flux_and_a_source():
 
 
 def test_conductivity_by_axes_and_by_position():
-    mesh = fc.generate.block((1.0, 1.0), (3, 3), "quad4")
-    turned = fc.Model(mesh, "plane_strain")
+    turned = fc.Model(fc.generate.block((1.0, 1.0), (3, 3), "quad4"), "plane_strain")
     axes = [[1, 1, 0], [-1, 1, 0]]
     wood = {"E": (1.0, 1.0, 1.0), "nu": (0.3, 0.3, 0.3), "G": (0.4, 0.4, 0.4)}
     turned.add_material(fc.Orthotropic(**wood, conductivity=(4.0, 2.0, 1.0), axes=axes))
@@ -330,8 +328,7 @@ def test_free_expansion_by_conduction_is_without_stress():
     step = fc.solve(model, 2)[-1]
     assert step.displacement[:, 0] == pytest.approx(1e-3 * mesh.points[:, 0], abs=1e-14)
     assert np.abs(step.stress).max() < 1e-9
-    first = fc.solve(model, 2)[0]
-    assert first.temperature == pytest.approx(70.0)
+    assert fc.solve(model, 2)[0].temperature == pytest.approx(70.0)
 
 
 def test_temperatures_and_films_come_and_go():

@@ -73,8 +73,7 @@ def block_under_paraboloid(element, formulation, size, R_y=200.0, growth=0.4):
 def test_a_sphere_on_a_rigid_plane_is_hertz_at_equal_force(element, formulation, size, fit):
     """A half-sphere with 4 to 6 edges over the contact radius, a tenth of its own: 9 800 unknowns with 4."""
     options = {"growth": 0.6, "far": 0.5} if element == "tet10" else {}
-    contact = sphere_on_plane(element, formulation, size, **options)
-    assert np.abs(errors(contact, 1, 1.0, 1.0, fit)).max() < 0.01
+    assert np.abs(errors(sphere_on_plane(element, formulation, size, **options), 1, 1.0, 1.0, fit)).max() < 0.01
 
 
 @pytest.mark.parametrize(

@@ -78,8 +78,7 @@ def test_a_rotating_cylinder_that_cannot_lengthen():
 
 def test_the_axis_may_lie_anywhere_in_space():
     """The force on a body is that on its mass at its centre."""
-    mesh = fc.generate.box((2.0, 1.0, 1.0), (3, 2, 2), "hex8")
-    model = made_of(mesh, "3d", fc.LinearElastic(E, NU, density=2.0))
+    model = made_of(fc.generate.box((2.0, 1.0, 1.0), (3, 2, 2), "hex8"), "3d", fc.LinearElastic(E, NU, density=2.0))
     model.add_centrifugal(3.0, origin=(5.0, 1.0, -2.0), direction=(1.0, 2.0, 3.0))
     along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
     arm = np.array([1.0, 0.5, 0.5]) - (5.0, 1.0, -2.0)

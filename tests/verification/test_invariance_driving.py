@@ -119,8 +119,7 @@ def test_on_a_rigid_plane(formulation, options, dim):
 @cache
 def pressed(element, size, swap, multipliers="standard"):
     """Force and largest von Mises stress of a cylinder on a stiffer block."""
-    mesh = fc.generate.cylinder_on_block(element, R=50.0, size=6.0, contact_size=size)
-    model = elastic_model(mesh, "plane_strain")
+    model = elastic_model(fc.generate.cylinder_on_block(element, R=50.0, size=6.0, contact_size=size), "plane_strain")
     model.add_material(fc.LinearElastic(E=3000.0, nu=0.2), "BLOCK")
     supported(model, AXIS="x", BLOCK_BOTTOM="y", CYLINDER_TOP={"y": -1.0})
     sides = ("CONT_BLOCK", "CONT_CYLINDER")[:: 1 if swap else -1]

@@ -119,8 +119,7 @@ def drawn(element, by, friction=0.3, **options):
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("element", [*QUADRATIC, "hex8"])
 def test_uniform_pressure_and_full_friction_of_a_drawn_block(element, solver):
-    step = fc.solve(drawn(element, 0.02, formulation="mortar"), 1, linear_solver=solver)[-1]
-    contact = step.contact["plane"]
+    contact = fc.solve(drawn(element, 0.02, formulation="mortar"), 1, linear_solver=solver)[-1].contact["plane"]
     pressure = 1000.0 * 0.01 / 0.5
     np.testing.assert_allclose(contact.pressure, pressure, rtol=1e-6)
     np.testing.assert_allclose(contact.shear, np.tile([-0.3 * pressure, 0.0, 0.0], (len(contact.shear), 1)), atol=1e-5)

@@ -186,8 +186,7 @@ def test_mirrored_bodies_meet_with_next_to_no_shear(element, forma04):
     mesh = fc.generate.half_spheres(element, arc_sizes=(0.8, 6.0), radial_sizes=(0.8, 6.0))
     forces = []
     for friction in (0.0, 0.3):
-        model = forma04(mesh, "mortar", multipliers="dual", friction=friction)
-        contact = fc.solve(model, 1)[-1].contact["hertz"]
+        contact = fc.solve(forma04(mesh, "mortar", multipliers="dual", friction=friction), 1)[-1].contact["hertz"]
         forces.append(np.linalg.norm(contact.force))
     assert contact.sticking[contact.active].all()
     assert np.abs(contact.shear).max() < 0.03 * contact.pressure_max

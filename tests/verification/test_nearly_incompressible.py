@@ -76,8 +76,7 @@ def hertz(element, nu, coarseness):
     mesh = fc.generate.half_spheres(
         element, arc_sizes=(0.2 * coarseness, 2 * coarseness), segments=int(15 / coarseness)
     )
-    model = pressed_spheres(mesh, 1.0, material=fc.LinearElastic(E=20_000.0, nu=nu))
-    contact = fc.solve(model, 1)[-1].contact["hertz"]
+    contact = fc.solve(pressed_spheres(mesh, 1.0, material=fc.LinearElastic(E=20_000.0, nu=nu)), 1)[-1].contact["hertz"]
     return np.array([np.abs(contact.force[1]), contact.pressure.max()])
 
 

@@ -20,8 +20,7 @@ def test_a_penalty_is_an_elastic_layer(formulation, kinematics):
     """Two blocks of stiffness E / h in series with the penalty."""
     mesh = boxes() if kinematics == "3d" else blocks()
     stiffness, penalty = MODULUS[kinematics] / 10.0, 5e4
-    model = touching(held(mesh, kinematics), formulation, penalty=penalty)
-    last = fc.solve(model, fc.linear_ramp(1))[-1]
+    last = fc.solve(touching(held(mesh, kinematics), formulation, penalty=penalty), fc.linear_ramp(1))[-1]
     pressure = 0.02 / (1 / stiffness + 1 / penalty)
     contact, axis = last.contact["pair"], mesh.dim - 1
     assert contact.pressure == pytest.approx(pressure, rel=1e-10)
@@ -46,8 +45,7 @@ def test_penetration_falls_as_the_penalty_grows(formulation, forma04):
     exact = fc.solve(forma04(mesh, formulation), fc.linear_ramp(2))[-1].contact["hertz"]
     depths, errors = [], []
     for penalty in (1e6, 1e7, 1e8):
-        model = forma04(mesh, formulation, penalty=penalty)
-        contact = fc.solve(model, fc.linear_ramp(2))[-1].contact["hertz"]
+        contact = fc.solve(forma04(mesh, formulation, penalty=penalty), fc.linear_ramp(2))[-1].contact["hertz"]
         depths.append(contact.penetration)
         errors.append(abs(contact.force[1] / exact.force[1] - 1))
     if formulation == "node_to_segment":
@@ -398,8 +396,7 @@ def test_supported_nodes_shear_it_too():
         support for support in model.supports if support.component != 0 or support.group == "LOWER_BOTTOM"
     ]
     supported(model, UPPER={"ramp": SIDEWAYS, "x": 0.004}, LOWER="x")
-    contact = solved(model)[2].contact["pair"]
-    np.testing.assert_allclose(contact.shear[:, 0], -STIFFNESS * 0.004, rtol=1e-9)
+    np.testing.assert_allclose(solved(model)[2].contact["pair"].shear[:, 0], -STIFFNESS * 0.004, rtol=1e-9)
 
 
 def test_tractions_of_earlier_files_continue_as_slips():
@@ -410,5 +407,4 @@ def test_tractions_of_earlier_files_continue_as_slips():
     pair = begun[-1].restart["pairs"]["pair"]
     positions, slips = pair.pop("elastic_slip")
     pair["traction"] = [positions, slips * STIFFNESS]
-    resumed = solved(model, resume=begun)
-    assert abs(resumed[-1].displacement - whole[-1].displacement).max() < 1e-12
+    assert abs(solved(model, resume=begun)[-1].displacement - whole[-1].displacement).max() < 1e-12

@@ -102,8 +102,7 @@ def bulging_boxes(element):
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("element", ["hex8", "hex20", "hex27", "tet4", "tet10"])
 def test_a_bulging_block_in_space(method, element, swap, carried):
-    model = held(bulging_boxes(element), "3d", 0.15)
-    check(solved(made(model, swap=swap, **METHODS[method])), carried)
+    check(solved(made(held(bulging_boxes(element), "3d", 0.15), swap=swap, **METHODS[method])), carried)
 
 
 @EVERY

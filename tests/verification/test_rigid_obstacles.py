@@ -92,8 +92,7 @@ def hertz_box(element, n, kinematics="plane_strain"):
         for k, axis in enumerate("xy"):
             if (side, axis) != ("BOTTOM", "x"):
                 model.prescribe(side, **{axis: lambda x, k=k: box.displacement(x)[:, k]})
-    inner = mesh.with_groups(points={"REST": np.setdiff1d(mesh.points_of("BOTTOM"), mesh.points_of("LEFT"))})
-    model.mesh = inner
+    model.mesh = mesh.with_groups(points={"REST": np.setdiff1d(mesh.points_of("BOTTOM"), mesh.points_of("LEFT"))})
     model.prescribe("REST", x=lambda x: box.displacement(x)[:, 0])
     model.add_obstacle("bowl", secondary="TOP", obstacle=Bowl(box.obstacle))
     return model, box
@@ -126,8 +125,7 @@ def test_a_clearance_is_not_a_penetration_beside_the_facets():
 
 
 def test_a_plane_drawn_along_drags_by_friction():
-    mesh = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
-    model = elastic_model(mesh, "plane_strain", nu=0.0, TOP="xy")
+    model = elastic_model(fc.generate.block((1.0, 1.0), (4, 4), "quad4"), "plane_strain", nu=0.0, TOP="xy")
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, motion={"x": 0.01, "y": 1e-3}, friction=0.2)
     contact = fc.solve(model, fc.linear_ramp(5))[-1].contact["plane"]

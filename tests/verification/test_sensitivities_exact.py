@@ -64,8 +64,7 @@ def test_the_press_fit_of_lame():
 
 
 def ball_on_plane(force: float, size: float) -> fc.Model:
-    mesh = fc.generate.half_spheres(size=8.0, contact_size=size)
-    model = fc.Model(mesh, kinematics="axisymmetric")
+    model = fc.Model(fc.generate.half_spheres(size=8.0, contact_size=size), kinematics="axisymmetric")
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), "SPHHAU")
     model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
     supported(model, A1A2="x", A2B2={"y": 0.0})
@@ -91,8 +90,7 @@ def test_hertz_and_what_scaling_leaves_the_same():
 
 
 def test_prescribed_displacements_scale_forces_with_moduli():
-    mesh = fc.generate.sphere_on_block("hex8", R=10.0, contact_size=2.0, size=5.0)
-    model = fc.Model(mesh, kinematics="3d")
+    model = fc.Model(fc.generate.sphere_on_block("hex8", R=10.0, contact_size=2.0, size=5.0), kinematics="3d")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), "SPHERE")
     model.add_material(fc.LinearElastic(E=3000.0, nu=0.2), "BLOCK")
     supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.3})

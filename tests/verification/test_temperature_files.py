@@ -117,8 +117,7 @@ def test_points_in_another_order_are_found_by_their_place(tmp_path):
     mesh = plane("tri6", "plane_stress")
     values = field_of(mesh)
     order = np.random.default_rng(3).permutation(mesh.n_points)
-    path = vtu(tmp_path / "mixed.vtu", mesh, values, order)
-    (one,) = heated(mesh, "plane_stress", path, "TEMP")
+    (one,) = heated(mesh, "plane_stress", vtu(tmp_path / "mixed.vtu", mesh, values, order), "TEMP")
     (other,) = heated(mesh, "plane_stress", values, from_file=False)
     np.testing.assert_array_equal(one.displacement, other.displacement)
 

@@ -22,8 +22,7 @@ def stretched(mesh, prescribed=(), **options):
     """
     dim = mesh.dim
     model = elastic_model(mesh, "3d" if dim == 3 else "plane_strain")
-    ends = ("L_ZMIN", "U_ZMAX") if dim == 3 else ("LOWER_BOTTOM", "UPPER_TOP")
-    for group in ends:
+    for group in ("L_ZMIN", "U_ZMAX") if dim == 3 else ("LOWER_BOTTOM", "UPPER_TOP"):
         model.prescribe(group, **{axis: linear(k, dim) for k, axis in enumerate("xyz"[:dim])})
     sides = ("XMIN", "XMAX", "YMIN", "YMAX") if dim == 3 else ("LEFT", "RIGHT")
     for body in ("L", "U") if dim == 3 else ("LOWER", "UPPER"):

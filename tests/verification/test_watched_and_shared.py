@@ -216,8 +216,7 @@ def pin_in_hole(formulation, **options):
 @pytest.mark.filterwarnings("ignore:.*deviate from their arcs")
 @each
 def test_forces_lie_along_the_normals_that_are_asked_for(formulation, options):
-    model = pin_in_hole(formulation, normals="secondary", **options)
-    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["pair"]
+    contact = fc.solve(pin_in_hole(formulation, normals="secondary", **options), fc.linear_ramp(1))[-1].contact["pair"]
     along = contact.coordinates / np.linalg.norm(contact.coordinates, axis=1, keepdims=True)
     # At the ends the mean of one chord's normal leans by half its angle, which the next node feels, too.
     inside = slice(1, -1) if formulation == "node_to_segment" else slice(2, -2)
@@ -255,8 +254,7 @@ def test_wrong_options_are_refused(options, words):
 
 
 def test_an_option_that_is_none_is_left_out():
-    model = touching(held(blocks()), "node_to_segment", friction=None, penalty=None)
-    assert model.contact[0].options == {}
+    assert touching(held(blocks()), "node_to_segment", friction=None, penalty=None).contact[0].options == {}
 
 
 @pytest.mark.parametrize(("options", "words"), [

@@ -25,8 +25,7 @@ def test_the_table_tells_kernels_as_they_are(run):
     assert len(numbers) > 15
     for module, name, given in (ahead.table()["kernels"][number] for number in numbers):
         kernel = getattr(importlib.import_module(module), name)
-        parameters = inspect.signature(getattr(kernel, "py_func", kernel)).parameters
-        assert len(parameters) == len(given), (module, name)
+        assert len(inspect.signature(getattr(kernel, "py_func", kernel)).parameters) == len(given), (module, name)
         for one in given:
             ahead.numba_type(one)
 

@@ -48,8 +48,7 @@ def functions(kernel, seen):
 @pytest.mark.parametrize(("module", "name", "kernel"), list(interpretable()))
 def test_only_operations_with_one_result(module, name, kernel):
     for function in functions(kernel, []):
-        names = {found for found in function.__code__.co_names if found not in KNOWN}
-        for found in names:
+        for found in {found for found in function.__code__.co_names if found not in KNOWN}:
             value = function.__globals__.get(found)
             field = value is None  # of a named tuple
             assert field or hasattr(value, "py_func") or isinstance(value, int | float | type), (module, name, found)

@@ -57,8 +57,7 @@ def test_every_positive_definite_compliance_is_solved(seed, most_friction):
 @pytest.mark.parametrize("tangential", [0.25, 1.0, -2.0])
 def test_one_constraint_by_hand(tangential):
     # n = 2 closes the gap of -4; up to 0.5 * 2 the tangential force stops the slip, beyond the rest slides on.
-    F = np.diag([2.0, 0.5])
-    found = solved(F, np.array([[-4.0], [tangential]]), np.array([0.5]))
+    found = solved(np.diag([2.0, 0.5]), np.array([[-4.0], [tangential]]), np.array([0.5]))
     t = -np.clip(tangential / 0.5, -1.0, 1.0)
     np.testing.assert_allclose(found.y.ravel(), [2.0, t], rtol=1e-14)
     np.testing.assert_allclose(found.gaps.ravel(), [0.0, tangential + 0.5 * t], atol=1e-14)

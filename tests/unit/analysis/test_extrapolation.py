@@ -61,8 +61,7 @@ def test_displacements_and_forces_are_each_compared_with_their_own():
 def test_what_a_file_keeps_is_what_was_there_and_earlier_files_tell_less():
     found = after_two_steps()
     u, loads = found.states[-1][0], (np.zeros(3), 3.0 * np.arange(3.0))
-    again = Extrapolation.from_dict(found.to_dict(), u)
-    assert again.to_loads(*loads).ratio == found.to_loads(*loads).ratio == 1.0
+    assert Extrapolation.from_dict(found.to_dict(), u).to_loads(*loads).ratio == found.to_loads(*loads).ratio == 1.0
     kept = found.to_dict()
     kept["loads"] = [parts[1] for parts in kept["loads"]]
     assert Extrapolation.from_dict(kept, u).to_loads(*loads).ratio == 0.0

@@ -306,8 +306,7 @@ def test_a_soft_penalty_holds_a_stiff_block(penalty):
     model.add_pressure("TOP", 1e-3)
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, penalty=penalty)
-    step = fc.solve(model, 1)[-1]
-    np.testing.assert_allclose(-step.displacement[:, 1], 1e-3 / penalty, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(-fc.solve(model, 1)[-1].displacement[:, 1], 1e-3 / penalty, rtol=1e-6, atol=1e-8)
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
@@ -323,5 +322,4 @@ def test_a_nearly_incompressible_ring_that_friction_holds_by_few_sliding_points_
         model.add_obstacle(side.lower(), secondary=side, obstacle=wall, friction=0.3, ramp=ramp, **motion)
     model.add_pressure("RIGHT", 0.2, ramp=[(0, 0), (1, 0), (2, 1)])
     contact = fc.solve(model, [0.25 * k for k in range(1, 9)])[-1].contact
-    total = sum(pair.force[1] for pair in contact.values())
-    assert abs(total) < 1e-6 * contact["top"].normal_force
+    assert abs(sum(pair.force[1] for pair in contact.values())) < 1e-6 * contact["top"].normal_force

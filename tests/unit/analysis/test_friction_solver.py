@@ -39,8 +39,7 @@ def componentwise(C, along):
     k, m, dim = along.shape
     F = operator(np.zeros(2 * ((1 + k) * m,)))
     rows = csr_array((m, m * dim))
-    positions = np.zeros((m, dim))
-    constraints = Constraints(rows, np.zeros(m), positions, DenseCompliance(C), k * (rows,), tuple(along))
+    constraints = Constraints(rows, np.zeros(m), np.zeros((m, dim)), DenseCompliance(C), k * (rows,), tuple(along))
     return delassus.with_compliance(F, constraints, np.arange(m), np.arange(len(F.d))).S
 
 
@@ -55,8 +54,7 @@ def test_the_compliance_of_components_is_that_of_the_vectors(dim):
     vectors = components[0][:, None] * normal + np.einsum("km,kmd->md", components[1:], along)
     given = C @ vectors  # (m, dim)
     wanted = np.concatenate([[np.einsum("md,md->m", given, normal)], np.einsum("md,kmd->km", given, along)])
-    found = componentwise(C, along) @ components.ravel()
-    np.testing.assert_allclose(found, wanted.ravel(), atol=1e-12)
+    np.testing.assert_allclose(componentwise(C, along) @ components.ravel(), wanted.ravel(), atol=1e-12)
 
 
 def test_constraints_without_friction_keep_their_own_compliance():
@@ -264,8 +262,7 @@ def test_compliance_of_rows_against_dense_products():
     rows = tuple(csr_array(rng.normal(size=(8, 30)) * (rng.random((8, 30)) < 0.3)) for _ in range(3))
     yielding = rng.random(30)
     stack = np.stack([R.toarray() for R in rows])
-    expected = np.einsum("ain,n,bin->abi", stack, yielding, stack)
-    assert compliance_of_rows(rows, yielding) == pytest.approx(expected)
+    assert compliance_of_rows(rows, yielding) == pytest.approx(np.einsum("ain,n,bin->abi", stack, yielding, stack))
 
 
 @pytest.mark.parametrize(

@@ -74,8 +74,7 @@ def check_resumed(make, ramp, relative, after=(2,), **options):
         warnings.simplefilter("ignore", fc.FastcontactWarning)
         whole = fc.solve(make(), ramp, **options)
         for count in after:
-            steps = stopped_after(count, make(), ramp, **options)
-            again = fc.solve(make(), ramp, resume=steps, **options)
+            again = fc.solve(make(), ramp, resume=stopped_after(count, make(), ramp, **options), **options)
             assert len(again) == len(whole)
             for found, expected in zip(again[count:], whole[count:], strict=True):
                 assert_same(found, expected, relative)
@@ -201,8 +200,7 @@ def test_solver_tolerances_and_limits_may_change():
     steps = fc.solve(spheres(), fc.Ramp((0.2, 0.4)), linear_solver="amg")
     again = fc.solve(spheres(), fc.Ramp((0.4, 0.8)), resume=steps, linear_solver="direct", criteria=fc.Criteria(1e-5))
     whole = fc.solve(spheres(), fc.Ramp((0.2, 0.4, 0.8)), linear_solver="direct")
-    assert_same_to = np.abs(whole[-1].displacement).max() * 1e-8
-    assert np.abs(again[-1].displacement - whole[-1].displacement).max() < assert_same_to
+    assert np.abs(again[-1].displacement - whole[-1].displacement).max() < 1e-8 * np.abs(whole[-1].displacement).max()
 
 
 def test_all_that_a_step_changes_is_kept_or_set_anew():
@@ -249,5 +247,4 @@ def test_a_strengthened_multigrid_cycle_is_remembered():
     assert other.solver.hierarchy.bounds == analysis.solver.hierarchy.bounds
     f = np.random.default_rng(0).normal(size=other.solver.hierarchy.n)
     equations = analysis.solver._reduced.elimination
-    solutions = [each.solver.solution(f, equations, None) for each in (analysis, other)]
-    np.testing.assert_array_equal(*solutions)
+    np.testing.assert_array_equal(*(each.solver.solution(f, equations, None) for each in (analysis, other)))

@@ -26,8 +26,7 @@ def watched(parts, size=1.0, forces=None):
 
 @pytest.mark.parametrize("level", [1e-13, 1e-10, 1e-8])
 def test_noise_is_found_soon_and_measured(level):
-    parts = 1.0 + level * RNG.normal(size=(40, 20))
-    k, found = watched(parts)
+    k, found = watched(1.0 + level * RNG.normal(size=(40, 20)))
     assert WINDOW <= k <= 3 * WINDOW
     assert level < found["displacement"] < 10 * level
     assert found["force"] == 0.0
@@ -36,16 +35,14 @@ def test_noise_is_found_soon_and_measured(level):
 @pytest.mark.parametrize("rate", [0.5, 0.8, 0.9, 0.95, 0.99])
 def test_slow_convergence_is_no_noise(rate):
     u = RNG.normal(size=20)
-    parts = [1.0 + 1e-7 * rate**k * u for k in range(60) if rate**k > 1e-7]
-    assert watched(parts)[0] is None
+    assert watched([1.0 + 1e-7 * rate**k * u for k in range(60) if rate**k > 1e-7])[0] is None
 
 
 @pytest.mark.parametrize(("level", "force"), [(1e-5, 0.0), (1e-9, 1e-3)])
 def test_what_matters_is_not_let_pass(level, force):
     """Too large a scatter, of displacements or of contact forces, ends nothing."""
     parts = 1.0 + level * RNG.normal(size=(40, 20))
-    forces = 1.0 + force * RNG.normal(size=(40, 3))
-    assert watched(parts, forces=forces)[0] is None
+    assert watched(parts, forces=1.0 + force * RNG.normal(size=(40, 3)))[0] is None
 
 
 def side_by_side(element="tri6", unit=(1000.0, 1.0), **options):

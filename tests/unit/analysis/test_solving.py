@@ -51,8 +51,7 @@ def test_no_cycle_keeps_a_finished_analysis(solver, formulation):
     model = spheres(formulation)
 
     def solved():
-        analysis = Stepping(model, solver, 1e-10, fc.Criteria(geometry_updates=2), fc.linear_ramp(1))
-        return analysis.step(1, 1.0).index
+        return Stepping(model, solver, 1e-10, fc.Criteria(geometry_updates=2), fc.linear_ramp(1)).step(1, 1.0).index
 
     solved()
     gc.collect()

@@ -247,8 +247,7 @@ def test_a_beam_that_passes_a_disc_in_one_step_does_not_stick_to_it(strain, fric
     element, n = ("quad8", (3, 34)) if strain == "small" else ("quad4", (2, 12))
     beam = block((1.5, 17.0), n, element, (0.0, -17.0)).merged_groups("SIDE", ["LEFT", "BOTTOM"])
     model = elastic_model(beam, "plane_stress", E=2600.0, nu=0.38, strain=strain, TOP={"x": 0.0, "y": -9.0})
-    disc = fc.obstacles.Sphere((-0.7, -20.0), 0.5)
-    model.add_obstacle("c", secondary="SIDE", obstacle=disc, friction=friction)
+    model.add_obstacle("c", secondary="SIDE", obstacle=fc.obstacles.Sphere((-0.7, -20.0), 0.5), friction=friction)
     with pytest.warns(fc.FastcontactWarning, match="never closed"):
         (step,) = fc.solve(model, [end])
     assert not step.contact["c"].force.any()

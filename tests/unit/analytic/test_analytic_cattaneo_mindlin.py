@@ -164,7 +164,6 @@ def test_block_sticks_then_slides():
     assert sliding.shear_traction == pytest.approx(0.05, rel=1e-14)
     assert sliding.slip == pytest.approx(0.2, rel=1e-14)
     assert sliding.dissipation == pytest.approx(0.01, rel=1e-14)
-    limit = fc.analytic.block_sliding(**block, displacement=0.1)
-    assert limit.slip == pytest.approx(0.0, abs=1e-15)
+    assert fc.analytic.block_sliding(**block, displacement=0.1).slip == pytest.approx(0.0, abs=1e-15)
     with pytest.raises(fc.ModelError, match="displacement is -1"):
         fc.analytic.block_sliding(**block, displacement=-1.0)

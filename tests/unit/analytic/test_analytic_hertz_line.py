@@ -132,6 +132,5 @@ def test_every_load_quantity_leads_back_to_the_force(E, nu, R, force):
     bodies = {"E1": E, "nu1": nu, "R1": R, "E2": 3.0 * E, "nu2": 0.1}
     hertz = hertz_line(**bodies, force=force)
     for name in ("radius", "pressure_max"):
-        again = hertz_line(**bodies, **{name: getattr(hertz, name)})
-        assert again.force == pytest.approx(force, rel=1e-12)
+        assert hertz_line(**bodies, **{name: getattr(hertz, name)}).force == pytest.approx(force, rel=1e-12)
     assert hertz.at_force(4.0 * force).radius == pytest.approx(2.0 * hertz.radius, rel=1e-12)

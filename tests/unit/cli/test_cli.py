@@ -91,8 +91,7 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     case.write_text(text.replace("steps = 3", "instants = [0.001, 1.0]"))
     summary = tmp_path / "hard.json"
     summary.write_text('{"of": "an earlier run"}')
-    code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf"), "--json", str(summary)])
-    assert code == 2
+    assert main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf"), "--json", str(summary)]) == 2
     cut, told, *history, kept = capsys.readouterr().err.splitlines()
     assert cut.startswith("step 2 from 0.001 to 1 does not converge, halved: the contact geometry did not converge")
     assert told.startswith("no convergence: ")
@@ -108,8 +107,7 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     ((name, nodes),) = results.log["failed_step"][-1]["nodes"].items()
     assert (name, len(nodes)) == ("hertz", 3)
     assert f"most at points {nodes[0]} [" in told
-    failed = {"failed": results.error.split(": ", 1)[1], "complete_steps": 1}
-    assert json.loads(summary.read_text()) == failed
+    assert json.loads(summary.read_text()) == {"failed": results.error.split(": ", 1)[1], "complete_steps": 1}
     assert f"  stopped: {results.error}" in output_of(capsys, ["info", str(path)]).splitlines()
 
 

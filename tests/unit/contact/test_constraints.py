@@ -109,8 +109,7 @@ def test_only_the_first_and_the_last_end_of_an_open_line_meet_no_other(sides):
     _, side, _ = sides
     corners = side.only_block.facets[:, :2]
     outer = corners[~side.inner_ends]
-    times = np.bincount(corners.ravel())
-    np.testing.assert_array_equal(np.sort(outer), np.flatnonzero(times == 1))
+    np.testing.assert_array_equal(np.sort(outer), np.flatnonzero(np.bincount(corners.ravel()) == 1))
 
 
 def test_rows_are_sums_over_both_sides(sides):

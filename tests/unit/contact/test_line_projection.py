@@ -130,8 +130,7 @@ def mixed():
     """A top of quadrangles and triangles, a little rough."""
     halves = union(box((0.5, 1, 1), (2, 4, 1), "hex8"), box((0.5, 1, 1), (2, 4, 1), "wedge6", (0.5, 0, 0)))
     mesh = merge_points(halves, tolerance=1e-9)
-    points = mesh.points + 0.02 * np.sin(np.arange(mesh.points.size)).reshape(-1, 3)
-    return points, surface(mesh, "ZMAX")
+    return mesh.points + 0.02 * np.sin(np.arange(mesh.points.size)).reshape(-1, 3), surface(mesh, "ZMAX")
 
 
 def above(n, seed=0, beside=0.1):

@@ -38,8 +38,7 @@ def test_distances_from_a_box_are_exact(element):
     turn = Rotation.random(random_state=2).as_matrix() if dim == 3 else np.eye(2)
     surface = MeshedSurface(shell(mesh.replace(points=mesh.points @ turn.T)), "SHELL")
     distance, normal = surface.distance(points @ turn.T)
-    exact = box_distance(points)
-    assert np.abs(distance - exact).max() < 1e-14
+    assert np.abs(distance - box_distance(points)).max() < 1e-14
     assert np.abs(np.linalg.norm(normal, axis=1) - 1).max() < 1e-14
     # The normal is the gradient of the distance, but for points with several closest places.
     h = 1e-6
@@ -60,8 +59,7 @@ def test_at_sharp_edges_and_tips_the_sign_is_that_of_the_winding_number(angle, s
     flat = fc.Mesh(mesh.points, {"tri3": triangles}, cell_groups={"SHELL": np.arange(len(triangles))})
     points = np.random.default_rng(seed).uniform([-1.3, -1.3, -0.1], [1.3, 1.3, 1.3], (300, 3))
     distance, _ = MeshedSurface(flat, "SHELL").distance(points)
-    number = winding_numbers(points, mesh.points[triangles])
-    assert np.array_equal(distance < 0, number > 0.5)
+    assert np.array_equal(distance < 0, winding_numbers(points, mesh.points[triangles]) > 0.5)
 
 
 @pytest.mark.parametrize("angle", [4.0, 60.0, 170.0, 300.0, 350.0])

@@ -95,8 +95,7 @@ def test_projection_along_averaged_normals_is_continuous():
         at = facet_points(side, found.facet, found.xi)
         foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
         if normals == "averaged":  # the candidate stands exactly along the normal
-            arm = path - foot
-            assert np.abs(np.cross(arm, found.normal)).max() < 1e-12
+            assert np.abs(np.cross(path - foot, found.normal)).max() < 1e-12
         return max(
             np.linalg.norm(np.diff(foot, axis=0), axis=1).max(),
             np.linalg.norm(np.diff(found.normal, axis=0), axis=1).max(),
@@ -111,8 +110,7 @@ def test_gap_rows_do_not_see_rigid_motions():
     mesh = folded()
     side = surface(mesh, "ZMAX")
     nodes = np.flatnonzero(mesh.points[:, 2] < 0.5)[:6].reshape(2, 3).astype(np.int32)
-    shape = np.array([[0.2, 0.3, 0.5], [0.6, 0.3, 0.1]])
-    candidates = Candidates(nodes, shape)
+    candidates = Candidates(nodes, np.array([[0.2, 0.3, 0.5], [0.6, 0.3, 0.1]]))
     lifted = mesh.points.copy()
     lifted[nodes.ravel()] = np.random.default_rng(2).uniform([0.2, 0.2, 1.2], [0.8, 0.8, 1.4], (6, 3))
     found = pair(candidates.positions(lifted), DeformedSide(side, lifted), 0.5, "averaged")
@@ -128,8 +126,7 @@ def test_gap_rows_do_not_see_rigid_motions():
 
 def bound(kind, element="hex8", group="CONT_SPHERE", primary="hex8", **options):
     mesh = sphere_octant(element, R=2.0, size=1.0, contact_size=0.5, contact_radius=0.5)
-    plate = box((2.0, 1.0, 2.0), (2, 1, 2), primary, (0.0, -1.0, 0.0))
-    both = union(mesh, plate)
+    both = union(mesh, box((2.0, 1.0, 2.0), (2, 1, 2), primary, (0.0, -1.0, 0.0)))
     return kind(surface(both, group), surface(both, "YMAX"), both.points, False, 1.0, **options)
 
 
@@ -155,8 +152,7 @@ def test_every_rule_determines_the_field_and_keeps_its_resultant(element, option
     forces = projection.areas * (projection.P @ field)
     assert projection.field(forces) == pytest.approx(field, abs=1e-10)
     assert np.abs(projection.apply(forces)).max() < 1e-10
-    areas = nodal_areas(pair_.secondary, pair_.points, False)
-    assert projection.areas.sum() == pytest.approx(areas.sum(), rel=2e-3)
+    assert projection.areas.sum() == pytest.approx(nodal_areas(pair_.secondary, pair_.points, False).sum(), rel=2e-3)
 
 
 @pytest.mark.parametrize("element", ["quad4", "quad8", "tri3", "tri6"])

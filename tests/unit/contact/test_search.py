@@ -63,8 +63,7 @@ def test_projection_on_a_circle_of_quadratic_facets_and_normals_point_outward():
     corners = np.ascontiguousarray(np.stack([on(end[1:]), on(end[:-1]), on(middle)], axis=1))
     directions = np.linspace(-1.5, -0.05, 23)
     _, _, normal, overhang = search(1.3 * on(directions), corners)
-    unit = on(directions) / 10
-    assert np.abs(normal - unit).max() < 2e-3
+    assert np.abs(normal - on(directions) / 10).max() < 2e-3
     assert (overhang == 0).all()
 
 

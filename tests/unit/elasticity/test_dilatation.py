@@ -199,8 +199,7 @@ def test_two_materials_of_one_mesh_are_each_as_alone():
 def test_incompatible_modes_come_before_a_mean_dilatation():
     """In the elements that have them, which are not those of axisymmetry."""
     rubber = fc.LinearElastic(E=1.0, nu=0.4999, incompatible_modes=True)
-    model = made_of(fc.generate.block(), "plane_strain", rubber)
-    field = model.material_field()
+    field = made_of(fc.generate.block(), "plane_strain", rubber).material_field()
     assert rubber.averaged
     assert rubber.incompatible_modes
     assert dilatation.split("quad4", field.moduli, field.treatment) is None

@@ -185,8 +185,7 @@ def test_a_coupled_group_follows_one_node_which_a_support_may_prescribe():
     model.prescribe("TOP_LEFT", y=0.25)
     fixed, values = model.prescribed()
     motion = ConstrainedMotion(fixed.ravel(), model.relations)
-    lift = motion.lift(values.ravel(), [1.0]).reshape(-1, 2)
-    assert lift[mesh.points_of("TOP"), 1] == pytest.approx(0.25)
+    assert motion.lift(values.ravel(), [1.0]).reshape(-1, 2)[mesh.points_of("TOP"), 1] == pytest.approx(0.25)
 
 
 # --- messages -----------------------------------------------------------------------------------------------------

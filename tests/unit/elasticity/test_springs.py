@@ -228,5 +228,4 @@ def test_the_parts_make_the_whole(size, seed, n, share):
     assert np.count_nonzero(taken.data) == taken.nnz
     assert taken.has_canonical_format
     assert {taken.indices.dtype, taken.indptr.dtype} == {np.dtype(np.int32)}
-    rows = np.repeat(np.arange(n), np.diff(left.indptr))
-    assert np.count_nonzero(rows == left.indices) == n
+    assert np.count_nonzero(np.repeat(np.arange(n), np.diff(left.indptr)) == left.indices) == n

@@ -24,8 +24,7 @@ def positive(n, density, seed):
 
 def apart(seed):
     """One of several pieces, some of them a single unknown."""
-    pieces = [positive(n, 0.2, seed + n) for n in (1, 12, 1, 9, 1)]
-    return csc_array(block_diag(pieces))
+    return csc_array(block_diag([positive(n, 0.2, seed + n) for n in (1, 12, 1, 9, 1)]))
 
 
 MATRICES = [
@@ -88,8 +87,7 @@ def test_factors_are_those_of_the_matrix(A, m):
     late[made._position[last]] = True
     assert not L[np.ix_(~late, late)].any()
     np.testing.assert_allclose(A @ made.solve(np.ones(n)), np.ones(n), atol=1e-12)
-    inverse = np.linalg.inv(A.toarray())[np.ix_(last, last)]
-    np.testing.assert_allclose(made.last_inverse(), inverse, atol=1e-13)
+    np.testing.assert_allclose(made.last_inverse(), np.linalg.inv(A.toarray())[np.ix_(last, last)], atol=1e-13)
 
 
 @pytest.mark.parametrize("m", [0, 30])

@@ -105,8 +105,7 @@ def test_mid_nodes_stand_in_the_order_of_the_edges(element):
     ends = element.nodes[edges]
     assert len(np.unique(np.sort(edges, axis=1), axis=0)) == len(edges)
     if element.order == 2:
-        found = element.nodes[element.n_corners : element.n_corners + len(edges)]
-        assert np.array_equal(found, ends.mean(axis=1))
+        assert np.array_equal(element.nodes[element.n_corners : element.n_corners + len(edges)], ends.mean(axis=1))
 
 
 @pytest.mark.parametrize("element", ALL, ids=lambda e: e.name)

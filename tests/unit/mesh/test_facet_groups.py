@@ -206,8 +206,7 @@ def test_gmsh_hands_over_physical_groups(gmsh, order):
     assert mesh.cell_groups["FACE"].tolist() == mesh.cell_groups["SAME"].tolist()
     assert (mesh.points[mesh.cells_of("FACE")[facet]][..., 2] == 1.0).all()
     assert len(mesh.points_of("TIP")) == 1
-    volume = fc.quality(mesh)
-    assert "inside out" not in str(volume)
+    assert "inside out" not in str(fc.quality(mesh))
 
 
 def test_gmsh_without_groups_and_with_a_body_that_has_none(gmsh):

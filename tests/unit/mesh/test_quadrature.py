@@ -103,8 +103,7 @@ def test_a_rhomb_and_a_dart():
 
 def test_facets_of_a_cube_have_right_angles():
     corners = elements.get("hex8").nodes
-    mesh = fc.Mesh(corners, {"hex8": [range(8)], "quad4": [[0, 1, 2, 3]]})
-    found = quality(mesh)
+    found = quality(fc.Mesh(corners, {"hex8": [range(8)], "quad4": [[0, 1, 2, 3]]}))
     assert (found.smallest_angle, found.largest_angle) == pytest.approx((90.0, 90.0))
     assert "volume 8 [length^3]" in str(found)
 

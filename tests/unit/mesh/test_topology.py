@@ -140,8 +140,7 @@ def test_hinges_name_their_nodes_and_parts():
 
 def test_bodies_apart_and_points_of_none_have_no_hinges():
     mesh = joined("quad4", (0.0, 0.0), (1.0, 1.0), merged=False)
-    lone = mesh.replace(points=np.vstack([mesh.points, [[9.0, 9.0]]]))
-    parts = fc.topology.rigid_parts(lone)
+    parts = fc.topology.rigid_parts(mesh.replace(points=np.vstack([mesh.points, [[9.0, 9.0]]])))
     assert parts.count == 2
     assert parts.part.tolist() == [0] * 4 + [1] * 4 + [-1]
     assert not len(parts.hinge_node)
@@ -149,8 +148,7 @@ def test_bodies_apart_and_points_of_none_have_no_hinges():
 
 def test_a_facet_between_elements_of_two_kinds_or_orders_joins():
     points = [[0, 0], [1, 0], [1, 1], [0, 1], [2, 0.5], [0.5, 0.0], [1, 0.5], [0.5, 1], [0, 0.5]]
-    mixed = fc.Mesh(points[:5], {"quad4": [[0, 1, 2, 3]], "tri3": [[1, 4, 2]]})
-    assert fc.topology.rigid_parts(mixed).count == 1
+    assert fc.topology.rigid_parts(fc.Mesh(points[:5], {"quad4": [[0, 1, 2, 3]], "tri3": [[1, 4, 2]]})).count == 1
     orders = fc.Mesh(points, {"quad8": [[0, 1, 2, 3, 5, 6, 7, 8]], "tri3": [[1, 4, 2]]})
     assert len(np.unique(fc.topology.cells_joined_by_facets(orders))) == 2
     assert fc.topology.rigid_parts(orders).count == 1  # two common nodes hold as well

@@ -164,10 +164,8 @@ def test_nodes_of_single_precision_are_on_the_axis_and_others_not():
     points = cylinder().mesh.points.copy()
     left = cylinder().mesh.points_of("LEFT")
     points[left[0], 0], points[left[1], 0] = 4e-8, 1e-3
-    model = fc.Model(cylinder().mesh.replace(points=points), "axisymmetric")
-    assert model.axis_nodes.tolist() == [left[0], left[2]]
-    plane = fc.Model(cylinder().mesh, "plane_strain")
-    assert not len(plane.axis_nodes)
+    assert fc.Model(cylinder().mesh.replace(points=points), "axisymmetric").axis_nodes.tolist() == [left[0], left[2]]
+    assert not len(fc.Model(cylinder().mesh, "plane_strain").axis_nodes)
 
 
 def test_a_function_of_the_radius_that_vanishes_on_the_axis_is_not():

@@ -176,5 +176,4 @@ def test_nodes_across_a_thin_curved_sheet_do_not_hang(element, thickness):
 
 
 def test_bodies_in_contact_hang_on_nothing():
-    mesh = fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(7, 2))
-    assert not hanging(mesh)
+    assert not hanging(fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(7, 2)))

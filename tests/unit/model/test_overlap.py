@@ -59,8 +59,7 @@ def test_near_sharp_edges_the_winding_number_decides(angle, seed):
     number = winding_numbers(points, triangles)
     assert np.abs(number - np.round(number)).max() < 1e-9
     # Bilinear facets bulge a little beyond their triangles.
-    clear = np.abs(depth) > 2e-2
-    assert (number[clear] > 0.5).all()
+    assert (number[np.abs(depth) > 2e-2] > 0.5).all()
     assert (depth > 0).sum() >= 0.9 * (number > 0.5).sum()
 
 
@@ -170,8 +169,7 @@ def test_both_sides_prescribed(sides, friction, formulation):
 def shifted(by, mesh=None, **options):
     """A block moved by `by` into a wall at its left, by its top alone."""
     model = elastic_model(mesh or block((1.0, 1.0), (3, 4)), TOP={"x": -by, "y": 0.0})
-    wall = fc.obstacles.HalfSpace((0.0, 0.0), (1.0, 0.0))
-    model.add_obstacle("wall", secondary="LEFT", obstacle=wall, **options)
+    model.add_obstacle("wall", secondary="LEFT", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (1.0, 0.0)), **options)
     model.check()
     return model
 
@@ -231,8 +229,7 @@ def test_a_tool_of_prescribed_nodes_is_right(secondary):
 
 
 def test_an_overlap_before_any_load_is_that_of_the_mesh():
-    mesh = block((1.0, 1.0), (2, 2))
-    model = with_obstacle(elastic_model(mesh, BOTTOM="xy"), "floor", "BOTTOM", floor(2, 0.01))
+    model = with_obstacle(elastic_model(block((1.0, 1.0), (2, 2)), BOTTOM="xy"), "floor", "BOTTOM", floor(2, 0.01))
     model.check()
     assert not told(model)
 
@@ -402,8 +399,7 @@ def test_one_pair_of_both_halves_has_the_pressure_of_the_press(mesh, formulation
         model = elastic_model(matching, LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x")
         model.add_pressure("UPPER_TOP", 1.0)
         for half in ("LEFT", "RIGHT"):
-            side = f"CONT_UPPER_{half}"
-            model.add_contact(half, secondary=side, primary="CONT_LOWER", formulation=formulation)
+            model.add_contact(half, secondary=f"CONT_UPPER_{half}", primary="CONT_LOWER", formulation=formulation)
     (step,) = fc.solve(model, fc.linear_ramp(1))
     for contact in step.contact.values():
         assert contact.pressure == pytest.approx(np.ones(len(contact.points)), rel=1e-6)

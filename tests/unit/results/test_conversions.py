@@ -65,8 +65,7 @@ def test_pandas_gets_the_contact_tables_of_all_steps(results):
         table = fc.contact_table(step.contact["hertz"], step)
         for name in table.dtype.names:
             np.testing.assert_array_equal(rows[name].to_numpy(), table[name])
-    largest = frame.groupby("step")["pressure"].max()
-    assert largest[2] == results[-1].contact["hertz"].pressure_max
+    assert frame.groupby("step")["pressure"].max()[2] == results[-1].contact["hertz"].pressure_max
 
 
 def test_xarray_gets_the_fields_of_all_steps(results):
@@ -361,8 +360,7 @@ def test_the_file_keeps_each_side_and_shows_it_by_cell(tmp_path, capsys):
 def test_pictures_do_not_mix_the_sides(element, monkeypatch):
     pytest.importorskip("matplotlib", reason="pictures need matplotlib")
     model, _ = bars(element)
-    step = fc.solve(model, fc.linear_ramp(1))[-1]
-    drawn = fc.plot.deformed_shape(model.mesh, step)
+    drawn = fc.plot.deformed_shape(model.mesh, fc.solve(model, fc.linear_ramp(1))[-1])
     low, high = abs(STRAIN) * MODULI[0], abs(STRAIN) * MODULI[1]
     if element == "quad4":
         (field,) = (c for c in drawn.collections if c.get_array() is not None)
@@ -384,7 +382,6 @@ def test_the_summary_has_both_sides_of_a_probe(tmp_path):
         'probes = { edge = "EDGE" }\n'
     )
     out = tmp_path / "out.json"
-    words = ["run", str(tmp_path / "bars.toml"), "-o", str(tmp_path / "b.vtkhdf"), "--json", str(out), "-q"]
-    assert main(words) == 0
+    assert main(["run", str(tmp_path / "bars.toml"), "-o", str(tmp_path / "b.vtkhdf"), "--json", str(out), "-q"]) == 0
     sides = json.loads(out.read_text())["probes"]["edge"]["stress_by_material"]
     assert {name: pytest.approx(stress[1]) for name, stress in sides.items()} == {"0": -0.01, "1": -10.0}

@@ -391,8 +391,7 @@ def test_a_history_begins_at_zero_and_names_its_theory(steps_of_disc):
 
 @pytest.fixture(scope="module")
 def steps_of_disc():
-    model = pressed_spheres(fc.generate.half_spheres(size=10.0), formulation="node_to_segment")
-    return fc.solve(model, 4), "hertz"
+    return fc.solve(pressed_spheres(fc.generate.half_spheres(size=10.0), formulation="node_to_segment"), 4), "hertz"
 
 
 CASE = """

@@ -91,8 +91,7 @@ def test_forces_of_plane_models_are_per_thickness_in_a_history(given):
 
 
 def test_forces_of_other_models_are_whole_in_a_history():
-    mesh = fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), "hex8")
-    solid = fc.Model(mesh, "3d")
+    solid = fc.Model(fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), "hex8"), "3d")
     solid.fix("ZMIN", "xyz")
     disc = fc.Model(fc.generate.block((1.0, 1.0), (2, 2)), "axisymmetric")
     disc.fix("BOTTOM", "xy")
@@ -109,8 +108,7 @@ def test_forces_of_other_models_are_whole_in_a_history():
 
 def test_large_numbers_have_no_power_of_ten():
     contact = pressed(0.0)[-1].contact["floor"]
-    factor = 10541.9 / contact.pressure_max
-    contact.pressure[:] *= factor
+    contact.pressure[:] *= 10541.9 / contact.pressure_max
     ax = fc.plot.pressure_profile(contact, units=fc.plot.UNITS)
     assert "= 10542 MPa" in ax.get_legend().get_texts()[0].get_text()
 

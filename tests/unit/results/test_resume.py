@@ -24,8 +24,7 @@ def spheres(E: float = 20_000.0, friction: float = 0.0, arc: float = 3.0) -> fc.
     model = fc.Model(mesh, "axisymmetric", case_text="first")
     model.add_material(fc.LinearElastic(E=E, nu=0.3))
     supported(model, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
-    options = {"formulation": "node_to_segment", "friction": friction}
-    return with_contact(model, "hertz", "CONT1", "CONT2", **options)
+    return with_contact(model, "hertz", "CONT1", "CONT2", formulation="node_to_segment", friction=friction)
 
 
 def begun(path: Path, instants: tuple[float, ...], model: fc.Model | None = None) -> list[fc.StepResult]:
@@ -136,8 +135,7 @@ def test_without_a_file_or_without_a_step_a_run_begins(path: Path) -> None:
 def test_a_finished_file_stays_as_it_is(path: Path) -> None:
     begun(path, (0.5, 1.0))
     before = path.read_bytes(), path.stat().st_mtime_ns
-    steps = resumed(path, fc.linear_ramp(2))
-    assert [step.load_factor for step in steps] == [0.5, 1.0]
+    assert [step.load_factor for step in resumed(path, fc.linear_ramp(2))] == [0.5, 1.0]
     assert (path.read_bytes(), path.stat().st_mtime_ns) == before
     assert os.listdir(path.parent) == [path.name]
 
@@ -180,8 +178,7 @@ def test_a_failed_run_is_tried_again_from_its_last_step(path: Path) -> None:
         resumed(path, ramp, spheres(friction=0.1), criteria=few)
     results = open_results(path)
     assert not results.complete
-    n_steps = len(results)
-    assert 0 < n_steps < 3
+    assert 0 < len(results) < 3
     assert "did not converge in 3 updates" in results.error
     with pytest.raises(ConvergenceError):
         resumed(path, ramp, spheres(friction=0.1), criteria=few)

@@ -113,8 +113,7 @@ def test_a_force_with_friction_shows_its_parts():
     model = elastic_model(fc.generate.block(), "plane_strain", E=1000.0, TOP={"x": 0.1, "y": -0.01})
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=0.25)
-    step = fc.solve(model, 1)[-1]
-    contact = step.contact["floor"]
+    contact = fc.solve(model, 1)[-1].contact["floor"]
     total, normal, tangential = contact.force_parts
     assert [total, normal, tangential] == pytest.approx(np.abs([np.linalg.norm(contact.force), *contact.force[::-1]]))
     assert tangential == pytest.approx(0.25 * normal)
@@ -429,8 +428,7 @@ def test_csv_is_what_the_standard_says(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     table = np.array([(1, 0.1, True, 'a "b", c')], [("n", int), ("x", float), ("active", bool), ("group", "U9")])
     write_csv(path, table, {"x": "mm"})
-    text = path.read_bytes().decode("utf-8")
-    assert text == 'n,x [mm],active,group\r\n1,0.10000000000000001,true,"a ""b"", c"\r\n'
+    assert path.read_bytes().decode("utf-8") == 'n,x [mm],active,group\r\n1,0.10000000000000001,true,"a ""b"", c"\r\n'
     with open(path, newline="") as file:
         assert next(csv.DictReader(file))["group"] == 'a "b", c'
     numbers = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1))

@@ -111,8 +111,7 @@ def test_vtk_reads_every_step_through_it(sidecar: Path) -> None:
         stress = expected.pop("stress")
         expected |= {f"stress_{name}": stress[:, i] for i, name in enumerate(("xx", "yy", "zz", "xy"))}
         for name, values in expected.items():
-            found = vtk_to_numpy(grid.GetPointData().GetArray(name))
-            np.testing.assert_array_equal(found, values, err_msg=name)
+            np.testing.assert_array_equal(vtk_to_numpy(grid.GetPointData().GetArray(name)), values, err_msg=name)
 
 
 def test_one_written_during_the_run_stays_right(tmp_path: Path) -> None:
@@ -122,8 +121,7 @@ def test_one_written_during_the_run_stays_right(tmp_path: Path) -> None:
         out.write(step_result(0))
         write_xdmf(path, sidecar)
         out.write(step_result(1))
-    grids = ElementTree.parse(sidecar).getroot().findall("./Domain/Grid/Grid")
-    assert len(grids) == 1
+    assert len(ElementTree.parse(sidecar).getroot().findall("./Domain/Grid/Grid")) == 1
     write_xdmf(path, sidecar)
     assert len(ElementTree.parse(sidecar).getroot().findall("./Domain/Grid/Grid")) == 2
     assert sorted(os.listdir(tmp_path)) == ["result.vtkhdf", "result.xdmf"]

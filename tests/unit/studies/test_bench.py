@@ -58,8 +58,7 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     assert {"versions", "cores", "threads"} <= set(stored["environment"])
     (entry,) = stored["results"][name]
     assert set(entry) == {"n_dofs", "peak_bytes", "works"}
-    last = list(entry["works"].values())[-1]
-    assert last["ratio"] == 1.0
+    assert list(entry["works"].values())[-1]["ratio"] == 1.0
     assert all(found["cpu_s"] > 0 and found["wall_s"] > 0 for found in entry["works"].values())
     assert name in capsys.readouterr().out
 

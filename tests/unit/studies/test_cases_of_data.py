@@ -179,8 +179,7 @@ def linked(parameters):
     ],
 )
 def test_a_path_sets_one_value_and_leaves_the_case_alone(path, value, where):
-    found = substitute(PARSED, {path: value})
-    assert where(found) == value
+    assert where(substitute(PARSED, {path: value})) == value
     assert PARSED["material"][1]["E"] == 2.0
     assert PARSED["mesh"]["arc_sizes"] == [1.0, 2.0]
     assert "formulation" not in PARSED["contact"]["pair"]
@@ -222,8 +221,7 @@ def test_a_power_of_a_negative_number_is_refused():
 
 def test_a_ring_has_two_edges_and_no_contact_radius():
     model = elastic_model(fc.generate.block((2.0, 1.0), (20, 8)), "axisymmetric", BOTTOM="y")
-    torus = fc.obstacles.Sphere((1.0, 2.0), 1.0)
-    model.add_obstacle("torus", secondary="TOP", obstacle=torus, motion={"y": -0.02})
+    model.add_obstacle("torus", secondary="TOP", obstacle=fc.obstacles.Sphere((1.0, 2.0), 1.0), motion={"y": -0.02})
     contact = fc.solve(model, 1)[-1].contact["torus"]
     assert contact.is_ring
     assert "contact radius ring from 0.9 to 1.15" in repr(contact)

@@ -102,8 +102,7 @@ def test_a_killed_sweep_redoes_no_finished_run(root, tmp_path):
     after = finished(store)
     assert len(after) == 8
     assert {name: after[name] for name in kept} == kept
-    points = json.loads(target.read_text())["points"]
-    forces = [point["force"] for point in points]
+    forces = [point["force"] for point in json.loads(target.read_text())["points"]]
     assert len(forces) == 8
     assert forces == sorted(forces)
 

@@ -102,8 +102,7 @@ def test_a_sweep_calls_the_function_with_all_choices():
     assert list(single.table()["size"]) == [0.5, 0.25]
     assert not {"h"} & {*single.table().dtype.names, *single.as_dict()["points"][0]}  # unknown of solved steps
     assert list(single.table()["bore"]) == list(found.table()["bore"][::2])
-    frame = pytest.importorskip("pandas").DataFrame(single.table())
-    assert frame.equals(single.to_pandas())
+    assert pytest.importorskip("pandas").DataFrame(single.table()).equals(single.to_pandas())
     loaded = fc.parameter_sweep(lambda force: tube(0.5), {"force": [7.0]}, quantities={"force": bore}, workers=1)
     assert loaded.table()["force"].tolist() == [7.0]
     assert loaded.table()["computed_force"].tolist() == [loaded.points[0].values["force"]]

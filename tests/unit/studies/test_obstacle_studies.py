@@ -119,20 +119,17 @@ def test_a_rigid_surface_from_a_file_is_found_beside_the_case(tmp_path):
     fc.write_mesh(
         tmp_path / "block.med", fc.generate.graded_block("quad4", width=20.0, contact_radius=1.2, contact_size=0.5)
     )
-    plate = fc.generate.block((4.0, 1.0), (4, 1), "quad4", origin=(-2.0, 0.0))
-    fc.write_mesh(tmp_path / "plate.med", plate)
+    fc.write_mesh(tmp_path / "plate.med", fc.generate.block((4.0, 1.0), (4, 1), "quad4", origin=(-2.0, 0.0)))
     shape = 'shape = "mesh"\nfile = "plate.med"\ngroup = "BOTTOM"\n'
     text = BALL.replace("axisymmetric", "plane_strain").replace(
         'shape = { kind = "sphere", centre = [0.0, 10.0], R = 10.0 }\n', shape
     )
     case.write_text(text)
-    study = fc.convergence_study(case, 1, workers=1)
-    assert study.series[0].values("force")[0] > 0
+    assert fc.convergence_study(case, 1, workers=1).series[0].values("force")[0] > 0
 
 
 def test_the_theory_counts_for_the_share_that_the_model_holds(root):
-    case = read_case(root / "data/cases/cylinder-on-block.toml")
-    found = quantities.comparison_values(case, "line", 10_000.0)
+    found = quantities.comparison_values(read_case(root / "data/cases/cylinder-on-block.toml"), "line", 10_000.0)
     assert found["theory"]["force"] == pytest.approx(10_000.0)
     assert found["equal_force"]["pressure_max"] == pytest.approx(3832.9, rel=1e-4)
 

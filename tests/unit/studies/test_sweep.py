@@ -176,8 +176,7 @@ def test_values_that_are_no_numbers_have_no_curve(case, parameter, values, headi
     first, second = (point.values["pressure_max"] for point in found.points)
     assert abs(first / second - 1.0) > 1e-4
     pytest.importorskip("matplotlib", reason="pictures need matplotlib")
-    ax = drawn(found)["contact force"]
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == list(values)
+    assert [tick.get_text() for tick in drawn(found)["contact force"].get_xticklabels()] == list(values)
 
 
 @pytest.mark.parametrize(

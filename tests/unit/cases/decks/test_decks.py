@@ -148,18 +148,15 @@ def test_loads_ramp_from_step_to_step_and_stay_or_go(tmp_path):
         "*Dsload, op=NEW\n",
         "*Cload\n15, 3, -25.\n*Dsload\nroof, P, 60.\n",
     )
-    deck = deck_of(tmp_path, WHOLE.replace(STEP, static_steps(*loads)))
-    found = deck.solve()
+    found = deck_of(tmp_path, WHOLE.replace(STEP, static_steps(*loads))).solve()
     assert [step.load_factor for step in found] == [1.0, 2.0, 3.0, 4.0]
-    forces = [step.contact["ss/sm"].force[2] for step in found]
-    assert forces == pytest.approx([100.0, 120.0, 20.0, 100.0])
+    assert [step.contact["ss/sm"].force[2] for step in found] == pytest.approx([100.0, 120.0, 20.0, 100.0])
 
 
 def test_prescribed_displacements_go_from_value_to_value(tmp_path):
     wave = "*Amplitude, name=wave\n0., 0., 0.5, 2., 1., 1.\n"
     again = SUPPORTS.replace("*Boundary", "*Boundary, op=NEW, amplitude=wave") + "top, 3, 3, -0.001\n"
-    steps = wave + static_steps("*Boundary\ntop, 3, 3, -0.002\n", again)
-    deck = deck_of(tmp_path, WHOLE.replace(STEP, steps))
+    deck = deck_of(tmp_path, WHOLE.replace(STEP, wave + static_steps("*Boundary\ntop, 3, 3, -0.002\n", again)))
     found = {step.load_factor: step.displacement[deck.point(17), 2] for step in deck.solve()}
     assert found == pytest.approx({1.0: -0.002, 1.5: -0.002, 2.0: -0.001}, rel=1e-9)
 

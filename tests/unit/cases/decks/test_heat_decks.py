@@ -235,6 +235,5 @@ def test_two_films_on_a_face_and_heat_that_nothing_holds_are_refused(tmp_path):
     head = two_bars() + MATERIALS + CONTACT
     with pytest.raises(fc.CaseError, match="3 is the second film coefficient of this face in one step, after 2"):
         deck_of(tmp_path, head + ENDS + STEP.format("*FILM\n5, F2, 20., 2.\n*FILM\n5, F2, 20., 3.\n"))
-    gone = ENDS + STEP.format("") + STEP.format("*BOUNDARY, OP=NEW\n")
-    deck = deck_of(tmp_path, head + gone)
+    deck = deck_of(tmp_path, head + ENDS + STEP.format("") + STEP.format("*BOUNDARY, OP=NEW\n"))
     refused(fc.ModelError, "in the load steps after 1: nothing determines the temperature of body", deck.solve)

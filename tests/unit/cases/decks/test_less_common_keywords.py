@@ -32,8 +32,7 @@ def test_a_node_set_of_an_assembly_names_sets_of_instances(tmp_path):
 def test_a_keyword_goes_on_over_comments_and_to_the_end_of_the_file(tmp_path):
     text = WHOLE.replace("*Surface Interaction, name=si\n", "*Surface Interaction,\n** a comment\nname=si\n")
     assert deck_of(tmp_path, text).solve()[0].contact["ss/sm"].force[2] == pytest.approx(100.0)
-    deck = deck_of(tmp_path, WHOLE.replace("*End Step\n", "*End Step,"))
-    assert deck.ramp.instants == (1.0,)
+    assert deck_of(tmp_path, WHOLE.replace("*End Step\n", "*End Step,")).ramp.instants == (1.0,)
 
 
 @pytest.mark.parametrize("asked", ["*Node Print, nset=x0\nU\n", "*Controls, reset\n", ""])
@@ -104,8 +103,7 @@ def test_two_couplings_share_the_rotation_of_a_node(tmp_path):
         "*Coupling, constraint name=a, ref node=9, surface=left\n*Kinematic\n1, 2\n"
         "*Coupling, constraint name=b, ref node=9, surface=right\n*Kinematic\n1, 2\n"
     )
-    text = before("*Material", links, FLAT).replace("5, 1, 1.\n", "9, 2, -1.\n")
-    deck = deck_of(tmp_path, text)
+    deck = deck_of(tmp_path, before("*Material", links, FLAT).replace("5, 1, 1.\n", "9, 2, -1.\n"))
     (step,) = deck.solve()
     top = [deck.point(n) for n in (3, 4, 6)]
     moved = step.displacement[top]
@@ -199,8 +197,7 @@ def test_gap_elements_between_bodies(tmp_path):
 
 def test_fixed_supports_keep_where_they_are(tmp_path):
     """*BOUNDARY, FIXED after a step that moved them; in the first step it holds them at zero."""
-    steps = ["*Boundary\ntop, 3, 3, -0.01\n", "*Boundary, fixed\ntop, 3\n"]
-    text = WHOLE.replace(STEP, static_steps(*steps))
+    text = WHOLE.replace(STEP, static_steps("*Boundary\ntop, 3, 3, -0.01\n", "*Boundary, fixed\ntop, 3\n"))
     found = [step.contact["ss/sm"].force[2] for step in deck_of(tmp_path, text).solve()]
     assert found == pytest.approx([1000.0, 1000.0])
     text = WHOLE.replace("*Dsload\nroof, P, 100.\n", "*Boundary, fixed\ntop, 3\n*Cload\n5, 3, 100.\n")
@@ -253,8 +250,7 @@ def test_anisotropic_moduli_in_the_order_of_decks(tmp_path):
     # Columns of the upper triangle: 11; 12, 22; 13, 23, 33; then shears without coupling.
     moduli = [3e5, 1e5, 4e5, 1e5, 1e5, 2e5, 0, 0, 0, 7e4, 0, 0, 0, 0, 8e4, 0, 0, 0, 0, 0, 9e4]
     lines = ",\n".join(", ".join(f"{v:g}" for v in moduli[k : k + 8]) for k in (0, 8, 16)) + "\n"
-    text = WHOLE.replace("*Elastic\n200000., 0.\n", f"*Elastic, type=anisotropic\n{lines}")
-    deck = deck_of(tmp_path, text)
+    deck = deck_of(tmp_path, WHOLE.replace("*Elastic\n200000., 0.\n", f"*Elastic, type=anisotropic\n{lines}"))
     D = np.array([[3e5, 1e5, 1e5], [1e5, 4e5, 1e5], [1e5, 1e5, 2e5]])
     (step,) = deck.solve()
     strain = np.linalg.solve(D, [0.0, 0.0, -100.0])
@@ -290,8 +286,7 @@ def test_a_distributing_coupling_whose_nodes_leave_a_rotation_free_is_refused_wi
 def test_no_separation_holds_what_was_once_closed(tmp_path):
     """Pressed, then pulled: the pull goes through the contact."""
     text = WHOLE.replace("name=si\n", "name=si\n*Surface Behavior, no separation\n")
-    deck = deck_of(tmp_path, text + STEP.replace("100.", "-40."))
-    forces = [step.contact["ss/sm"].force[2] for step in deck.solve()]
+    forces = [step.contact["ss/sm"].force[2] for step in deck_of(tmp_path, text + STEP.replace("100.", "-40.")).solve()]
     assert forces == pytest.approx([100.0, -40.0])
 
 

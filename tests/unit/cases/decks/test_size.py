@@ -139,8 +139,7 @@ def test_time_grows_as_the_deck(text, tmp_path):
 
 def test_forces_and_displacements_of_their_own(tmp_path):
     """Nodes with forces and displacements that differ have those: two cubes on each other, coincident points included."""
-    text = many_forces(3).replace("*Cload\n", "*Boundary\n3, 1, 1, 0.001\n4, 1, 1, 0.002\n*Cload\n")
-    deck = deck_of(tmp_path, text)
+    deck = deck_of(tmp_path, many_forces(3).replace("*Cload\n", "*Boundary\n3, 1, 1, 0.001\n4, 1, 1, 0.002\n*Cload\n"))
     (step,) = deck.solve()
     for k in range(3):
         held = [deck.point(8 * k + n) for n in (1, 2, 3, 4)]

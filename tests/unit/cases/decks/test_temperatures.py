@@ -59,8 +59,7 @@ def test_large_free_expansion(tmp_path, law):
 
 def test_heat_makes_a_held_bar_yield(tmp_path):
     plastic = "*Plastic\n150., 0.\n160., 0.1\n"
-    deck = deck_of(tmp_path, heated("*Expansion\n1.e-5\n" + plastic, change=HELD))
-    (step,) = deck.solve()
+    (step,) = deck_of(tmp_path, heated("*Expansion\n1.e-5\n" + plastic, change=HELD)).solve()
     p = (200.0 - 150.0) / (200_000.0 + 100.0)
     assert step.cell_fields["plastic_strain"] == pytest.approx(p, rel=1e-9)
     assert step.contact["ss/sm"].force[2] == pytest.approx(150.0 + 100.0 * p, rel=1e-9)

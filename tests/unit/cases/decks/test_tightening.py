@@ -55,8 +55,7 @@ def test_force_first_then_the_length_stays(tmp_path):
 
 
 def test_without_a_lock_the_force_stays(tmp_path):
-    deck = deck_of(tmp_path, BAR + TIGHT + cooled(""))
-    assert deck.solve()[-1].pretension["cut"]["force"] == pytest.approx(3.0)
+    assert deck_of(tmp_path, BAR + TIGHT + cooled("")).solve()[-1].pretension["cut"]["force"] == pytest.approx(3.0)
 
 
 def test_a_shortening_in_the_place_of_a_force(tmp_path):

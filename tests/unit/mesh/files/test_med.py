@@ -333,8 +333,7 @@ def write_characters(group, text):
 def write_med_2(path):
     """A file as MED 2.3 lays it out: no time step of the mesh, families in the mesh, lines apart as edges."""
     with h5py.File(path, "w") as file:
-        info = file.create_group("INFOS_GENERALES")
-        info.attrs.update(MAJ=np.int32(2), MIN=np.int32(3), REL=np.int32(6))
+        file.create_group("INFOS_GENERALES").attrs.update(MAJ=np.int32(2), MIN=np.int32(3), REL=np.int32(6))
         mesh = file.create_group("ENS_MAA/old")
         mesh.attrs.update(DIM=np.int32(2), TYP=np.int32(0), DES=np.bytes_("old".ljust(200)))
         points = mesh.create_dataset("NOE/COO", data=[0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0])

@@ -128,8 +128,7 @@ def test_gmsh_keeps_the_smaller_of_groups_that_overlap(tmp_path):
     assert "5 memberships of the groups all are left out" in said
     assert "1 groups of points have the name of a group of cells (left)" in said
     found = read_mesh(tmp_path / "patch.msh")
-    expected = {**members(patch()), "all": set()}
-    assert members(found) == expected
+    assert members(found) == {**members(patch()), "all": set()}
     assert set(found.point_groups) == {"corner", "top"}
 
 
@@ -271,8 +270,7 @@ def test_abaqus_files_that_meshio_reads_wrongly(tmp_path, old, new, message):
 
 
 def test_abaqus_set_of_a_later_section_only(tmp_path):
-    text = ABAQUS.replace(", ELSET=square", "").replace("CPS3", "CPS3, ELSET=triangle")
-    (tmp_path / "plate.inp").write_text(text)
+    (tmp_path / "plate.inp").write_text(ABAQUS.replace(", ELSET=square", "").replace("CPS3", "CPS3, ELSET=triangle"))
     refused(FileError, r"has an \*ELEMENT section with ELSET after one without", read_mesh, tmp_path / "plate.inp")
 
 

@@ -215,8 +215,7 @@ def test_vtk_reads_results_of_a_solid(tmp_path, element):
     grid = reader.GetOutput()
     assert_vtk_cells(grid, model.mesh, vtk)
     stress = grid.GetPointData().GetArray("stress")
-    values = np.array([stress.GetTuple(i) for i in range(model.mesh.n_points)])
-    np.testing.assert_array_equal(values, steps[1].stress)
+    np.testing.assert_array_equal(np.array([stress.GetTuple(i) for i in range(model.mesh.n_points)]), steps[1].stress)
     np.testing.assert_array_equal(fc.open_results(path)[-1].displacement, steps[1].displacement)
     again = fc.open_results(path).mesh
     assert {name: block.tolist() for name, block in again.cells.items()} == {

@@ -103,16 +103,14 @@ def test_both_surfaces_are_finest_at_the_pole(element, group):
 def test_a_transfinite_grid_of_straight_sides_is_the_rectangle():
     x, y = np.array([0.0, 0.2, 1.0]), np.array([0.0, 0.5, 0.6, 1.0])
     grid = rectangular_grid(3.0 * x, 2.0 * y)
-    found = coons_patch(grid[:, 0], grid[-1], grid[:, -1], grid[0], x, y)
-    assert found == pytest.approx(grid, abs=1e-15)
+    assert coons_patch(grid[:, 0], grid[-1], grid[:, -1], grid[0], x, y) == pytest.approx(grid, abs=1e-15)
 
 
 def test_a_transfinite_grid_reproduces_a_bilinear_map():
     u, v = np.linspace(0, 1, 5) ** 2, np.linspace(0, 1, 4)
     U, V = np.meshgrid(u, v, indexing="ij")
     exact = np.stack([2 * U + V + 0.5 * U * V, V * 3 - 0.3 * U + 0.7 * U * V], axis=2)
-    found = coons_patch(exact[:, 0], exact[-1], exact[:, -1], exact[0], u, v)
-    assert found == pytest.approx(exact, abs=1e-14)
+    assert coons_patch(exact[:, 0], exact[-1], exact[:, -1], exact[0], u, v) == pytest.approx(exact, abs=1e-14)
 
 
 @pytest.mark.parametrize("name", fc.generate.GENERATORS)

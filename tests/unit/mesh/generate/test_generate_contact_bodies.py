@@ -41,8 +41,7 @@ def test_crowned_blocks_mirror_each_other_and_touch_at_one_point(element):
 
 
 def test_crowned_blocks_are_finest_at_the_contact():
-    mesh = crowned_blocks(extent=30.0, contact_radius=1.0, contact_size=0.1)
-    x = np.sort(points(mesh, "CONT_LOWER")[:, 0])
+    x = np.sort(points(crowned_blocks(extent=30.0, contact_radius=1.0, contact_size=0.1), "CONT_LOWER")[:, 0])
     assert np.diff(x[np.abs(x) <= 1.0 + 1e-9]) == pytest.approx(0.1, rel=1e-9)
 
 
@@ -66,8 +65,7 @@ def test_a_grid_line_stands_at_the_edge_of_the_punch(element):
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8", "quad9"])
 def test_rings_have_their_areas_and_their_sides_stand_on_circles(element):
     mesh = rings(element, divisions_inner=(3, 10), divisions_outer=(4, 13))
-    sides = {"BORE": 20.0, "CONT_INNER": 50.0, "CONT_OUTER": 50.0, "RIM": 100.0}
-    for group, radius in sides.items():
+    for group, radius in {"BORE": 20.0, "CONT_INNER": 50.0, "CONT_OUTER": 50.0, "RIM": 100.0}.items():
         assert np.linalg.norm(points(mesh, group), axis=1) == pytest.approx(radius, rel=1e-14)
     assert (points(mesh, "SYMMETRY_X")[:, 0] == 0.0).all()
     assert (points(mesh, "SYMMETRY_Y")[:, 1] == 0.0).all()
@@ -128,8 +126,7 @@ def test_groups_are_the_outside(element):
 def test_edges_are_finest_at_the_pole_and_do_not_match():
     mesh = sphere_on_block("hex8", **SIZES)
     for group in ("CONT_SPHERE", "CONT_BLOCK"):
-        facets = mesh.cells_of(group)["quad4"]
-        corners = mesh.points[facets]
+        corners = mesh.points[mesh.cells_of(group)["quad4"]]
         length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
         away = np.linalg.norm(corners.mean(axis=1)[:, [0, 2]], axis=1)
         assert length[away < 0.4].max() < 0.2 * np.sqrt(2)

@@ -50,8 +50,7 @@ def test_every_node_of_the_arcs_lies_on_its_circle_and_the_others_inside(element
         radius = np.hypot(mesh.points[nodes, 0], mesh.points[nodes, 1] - centre)
         assert np.abs(radius - R).max() < 1e-12 * R
         assert len(nodes) == (elements.get(element).order * sum(len(mesh.cell_groups[g]) for g in groups)) + 1
-        body = mesh.points_of("SPHBAS" if centre < 0 else "SPHHAU")
-        inner = np.setdiff1d(body, nodes)
+        inner = np.setdiff1d(mesh.points_of("SPHBAS" if centre < 0 else "SPHHAU"), nodes)
         assert np.hypot(mesh.points[inner, 0], mesh.points[inner, 1] - centre).max() < R * (1 - 1e-4)
 
 
@@ -166,8 +165,7 @@ def test_triangles_grow_linearly_from_the_pole(near, far, plateau):
 
 
 def test_arc_is_graded_in_geometric_progression_with_the_ratio_asked_for():
-    mesh = fc.generate.half_spheres("quad4", arc_sizes=(0.2, 2.0))
-    arc = fc.topology.ordered_line(mesh, "CONT1", start="C1")
+    arc = fc.topology.ordered_line(fc.generate.half_spheres("quad4", arc_sizes=(0.2, 2.0)), "CONT1", start="C1")
     angles = 2 * np.arcsin(np.diff(arc.abscissa) / (2 * R)) * R  # lengths of arc
     assert angles.sum() == pytest.approx(R * math.pi / 4, rel=1e-12)
     assert angles[-1] / angles[0] == pytest.approx(10.0, rel=1e-9)

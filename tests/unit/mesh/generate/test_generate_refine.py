@@ -193,8 +193,7 @@ def test_centre_nodes_stand_where_the_curved_sides_put_them():
 def test_solid_cells_in_3d_become_quadratic_too(name):
     element = elements.get(name)
     mesh = to_quadratic(fc.Mesh(element.nodes, {name: [np.arange(element.n_nodes)]}))
-    quadratic = elements.get(element.quadratic)
-    assert mesh.points[mesh.cells[element.quadratic][0]] == pytest.approx(quadratic.nodes)
+    assert mesh.points[mesh.cells[element.quadratic][0]] == pytest.approx(elements.get(element.quadratic).nodes)
     assert fc.quality(mesh).n_bad == 0
 
 

@@ -57,13 +57,11 @@ def test_mirrored_groups_are_renamed_by_mapping_or_function():
     assert "TOP" not in by_mapping.cell_groups
     assert "TOP_LEFT" not in by_mapping.point_groups
     assert "BOTTOM" in by_mapping.cell_groups
-    by_function = renamed(mesh, str.lower)
-    assert set(by_function.cell_groups) == {name.lower() for name in mesh.cell_groups}
+    assert set(renamed(mesh, str.lower).cell_groups) == {name.lower() for name in mesh.cell_groups}
 
 
 def test_groups_given_one_name_are_united():
-    mesh = renamed(patch(), {"LEFT": "SIDES", "RIGHT": "SIDES"})
-    assert len(mesh.cell_groups["SIDES"]) == 4
+    assert len(renamed(patch(), {"LEFT": "SIDES", "RIGHT": "SIDES"}).cell_groups["SIDES"]) == 4
 
 
 def test_union_stacks_points_and_keeps_each_group_where_it_was():
@@ -72,8 +70,7 @@ def test_union_stacks_points_and_keeps_each_group_where_it_was():
     assert both.n_points == first.n_points + second.n_points
     assert list(both.cells) == ["quad4", "line2", "tri3"]
     for part, shift in ((first, 0), (second, first.n_points)):
-        solid = set(part.points_of("BLOCK") + shift)
-        assert solid <= set(both.points_of("BLOCK").tolist())
+        assert set(part.points_of("BLOCK") + shift) <= set(both.points_of("BLOCK").tolist())
     for group in first.cell_groups:
         assert len(both.cell_groups[group]) == len(first.cell_groups[group]) + len(second.cell_groups[group])
         expected = np.concatenate([first.points_of(group), second.points_of(group) + first.n_points])
