@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices, largest
+from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.blocks import Block, Location, key_of
 from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
@@ -199,10 +199,8 @@ class Histories(Generic[Key]):
 
     def _compare_repeated(self) -> None:
         """Raise CaseError if two values of a key differ by more than round-off of the largest value."""
-        if not self.repeated:
-            return
-        values = (*self.initial.values(), *self.step_values.values())
-        round_off = ROUND_OFF * largest(np.array([value.value for value in values]))
+        values = [value.value for value in (*self.initial.values(), *self.step_values.values())]
+        round_off = ROUND_OFF * max(map(abs, values), default=0.0)
         for earlier, value in self.repeated:
             if earlier.amplitude != value.amplitude or abs(earlier.value - value.value) > round_off:
                 raise value.location.error(
