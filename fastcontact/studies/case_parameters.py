@@ -7,12 +7,11 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from fastcontact.cases.keys import TOP_LEVEL
 from fastcontact.errors import CaseError, unknown
 from fastcontact.model.pair_options import SHARED_OPTIONS
 
-# Keys outside tables, each with a single value.
-SCALARS = tuple(key for key, kind in TOP_LEVEL.items() if kind in (str, (int, float)))
+# Keys outside tables that change results, each with a single value.
+SCALARS = ("kinematics", "reference_temperature", "strain")
 # A part of a path: a key and the indices that follow it in brackets.
 _PATH_PART = re.compile(r"([^.\[\]]+)((?:\[\d{1,9}\])*)$")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -30,9 +29,9 @@ def substitute(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, 
     linked = data.get("study", {}).get("parameters", {})
     for parameter, value in values.items():
         if parameter not in linked:
-            _set_value(case, parameter, value, [*linked, *case])
+            _set_value(case, parameter, value, linked)
         for path, law in linked.get(parameter, {}).items():
-            _set_value(case, path, law_value(law, value, f"study.parameters.{parameter}.'{path}'"), case)
+            _set_value(case, path, law_value(law, value, f"study.parameters.{parameter}.'{path}'"), ())
     return case
 
 
@@ -61,8 +60,7 @@ def _set_value(data: dict[str, Any], path: str, value: Any, names: Iterable[str]
     if pairs and path in ("friction", *SHARED_OPTIONS):
         raise CaseError(f"'{path}' belongs to a pair: write {' or '.join(f'{pair}.{path}' for pair in pairs)}")
     if len(keys) == 1 and path not in SCALARS:
-        values = [name for name in names if not isinstance(data.get(name), (dict, list))]
-        raise CaseError(unknown("parameter", path, {*values, *SCALARS} - {"title"}))
+        raise CaseError(unknown("parameter", path, [*names, *SCALARS]))
     entry: Any = data
     for key in keys[:-1]:
         entry = _member(entry, key, path)

@@ -193,8 +193,11 @@ def test_values_that_are_no_numbers_have_no_curve(case, parameter, values, headi
         ),
         ({"study.quadrangles.arc_sizes": (1.0,)}, r"such as study\.quadrangles\.arc_sizes\[0\]"),
         # Keys that the runs do not read.
-        ({"title": ("a", "b")}, "do not read 'title': leave it out, because it does not change"),
-        ({"check[0].tolerance": (0.1, 0.2)}, "it does not change the solution"),
+        ({"title": ("a", "b")}, "parameter 'title'"),
+        (
+            {"check[0].tolerance": (0.1, 0.2)},
+            r"do not read 'check\[0\]\.tolerance': leave it out, because it does not change",
+        ),
         ({"mesh.generator": ("a", "b")}, r"set study\.generator or keys of \[study\.quadrangles\]"),
         ({"mesh.segments": (4, 5)}, r"quad8 continuous, level \d, contact 'hertz'\) .* keys of \[study\.quadrangles\]"),
         ({"mesh.file": ("a",)}, r"or keys of \[study\.quadrangles\]"),
