@@ -265,12 +265,12 @@ class Sweep(Report):
         remarks += [f"{label_of(choice)} failed: {text}" for choice, text in self.failed]
         return remarks + [self._constant_theory_remark(name) for name in self.theory_independent_of]
 
-    def constant_in(self, quantity: str, *, varying: bool = False) -> list[str]:
+    def constant_in(self, quantity: str) -> dict[str, bool]:
         """Return the parameters on which the theory of a quantity does not depend.
 
-        If `varying`, these are only the parameters that change the quantity by more than one per cent.
+        The values are whether the parameter changes the quantity by more than one per cent; prescribed forces do not change.
         """
-        found = []
+        found = {}
         for name in self.parameters:
             groups: dict[str, list[Point]] = {}  # points that differ in this parameter only
             for point in self.points:
@@ -278,17 +278,16 @@ class Sweep(Report):
                 groups.setdefault(label_of(point.parameters, others), []).append(point)
             several = [points for points in groups.values() if len(points) > 1]
             theories = [{point.theory.get(quantity) for point in points} for points in several]
-            values = [[point.values.get(quantity, math.nan) for point in points] for points in several]
-            varies = any(np.ptp(row) > NOTABLE * np.max(np.abs(row)) for row in values)  # False for prescribed forces
-            if several and all(len(exact) == 1 and None not in exact for exact in theories) and (varies or not varying):
-                found.append(name)
+            if several and all(len(exact) == 1 and None not in exact for exact in theories):
+                values = [[point.values.get(quantity, math.nan) for point in points] for points in several]
+                found[name] = any(np.ptp(row) > NOTABLE * np.max(np.abs(row)) for row in values)
         return found
 
     @property
     def theory_independent_of(self) -> list[str]:
         """Parameters that change a main quantity by more than one per cent, but not its theory."""
-        found = {name for quantity in self._main_quantities() for name in self.constant_in(quantity, varying=True)}
-        return [name for name in self.parameters if name in found]
+        constant = [self.constant_in(quantity) for quantity in self._main_quantities()]
+        return [name for name in self.parameters if any(found.get(name) for found in constant)]
 
     def _constant_theory_remark(self, parameter: str) -> str:
         """Return the remark that the theory does not depend on a parameter, and how it can be made to."""
