@@ -95,22 +95,20 @@ class Drawing:
 
         If all values of the quantity are positive, the y axis has the scale of the x axis; otherwise it is linear.
         """
-        theories: dict[bytes, tuple[Any, Any, dict[str, Any]]] = {}  # distinct curves, by their values
-        distinct = not set(self.curve_parameters) <= set(self.sweep.constant_in(quantity))
+        distinct = not set(self.curve_parameters) <= self.sweep.constant_in(quantity).keys()
         for k, (label, points) in enumerate(self.points_of.items()):
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(self._x(points), y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
+            if k and not distinct:  # all curves have the same theory
+                continue
+            name = (self.theory_label + self._constant_note(quantity)) if k == 0 else None
+            style = {"label": name, "color": f"C{k}" if distinct else "black"}
             curves = (curve for curve in self.sweep.theories if curve.label == label and quantity in curve.values)
-            x: Any = self._x(points)
-            exact = np.array([point.theory.get(quantity, math.nan) for point in points])
-            style: dict[str, Any] = {"ls": "", "marker": "_", "ms": 9}
+            exact = [point.theory.get(quantity, math.nan) for point in points]
             if (curve := next(curves, None)) is not None:
-                x, exact, style = curve.x, curve.values[quantity], {"ls": "--", "lw": 1.1}
-            if np.isfinite(exact).any():
-                theories.setdefault(exact.tobytes(), (x, exact, style | {"color": f"C{k}" if distinct else "black"}))
-        name = self.theory_label + self._constant_note(quantity)
-        for k, (x, exact, style) in enumerate(theories.values()):
-            ax.plot(x, exact, label=None if k else name, **style)
+                ax.plot(curve.x, curve.values[quantity], "--", lw=1.1, **style)
+            elif np.isfinite(exact).any():
+                ax.plot(self._x(points), exact, "_", ms=9, **style)
         positive = all(point.values.get(quantity, 1.0) > 0 for point in self.sweep.points)
         scale = self.scale if positive else "linear"
         label = column(title(quantity), quantity, self.sweep.units)
