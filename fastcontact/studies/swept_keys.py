@@ -70,13 +70,13 @@ def _message(name: str, job: Job, study: Mapping[str, Any]) -> str:
     options = [f"study.options.{name}.{key}" for name, given in study.get("options", {}).items() if key in given]
     instead = "leave it out, because it does not change the solution or another parameter replaces it"
     if key in ("element", "formulation"):
-        instead = f"set the option '{key}' (--{key}) or study.combinations, or compare by 'fastcontact converge'"
+        instead = f"set the option '{key}' (--{key}) or study.combinations, which replaces it, or use 'converge'"
     elif path.startswith("mesh.") and job.base is not None:
         instead = "write a case file for each mesh, or sweep a Python function"
     elif path.startswith(("mesh.", *(f"study.{known}." for known in SHAPES))):
-        instead = f"set study.generator or keys of [study.{shape_of(str(_element(job)))}]"
+        instead = f"set study.generator or keys of [study.{shape_of(str(_element(job)))}], which replace it"
     elif path.startswith("ramp.") and "load_steps" in study:
         instead = "set study.load_steps, which replaces it, or leave study.load_steps out"
     elif options and not path.startswith("study."):
-        instead = f"set {' or '.join(options)}"
+        instead = f"set {' or '.join(options)}, which replaces it"
     return f"the runs of the sweep ({job.marks['combination']}, contact '{job.pair}') do not read '{name}': {instead}"
