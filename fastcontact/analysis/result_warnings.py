@@ -378,14 +378,9 @@ def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> 
 
 def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
-    if not _carries_force(pair, contact, state):
-        return
-    if not contact.active.any():
-        if contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
-            yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
-        return
-    count = _elements_across_radius(pair, contact)
-    if count is not None and count < MIN_ELEMENTS_ACROSS_RADIUS:
+    if not contact.active.any() and contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
+        yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
+    if count := _too_few_elements(pair, contact, state):
         needed, remedy = f"its pressure needs {MIN_ELEMENTS_ACROSS_RADIUS} or more", f"refine '{pair.secondary.group}'"
         if count == 1:
             friction = ", its direction and the work of friction" if pair.friction else " and its direction"
@@ -406,22 +401,21 @@ def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> 
 
 def coarse_contacts(problem: Problem, state: State, step: StepResult) -> dict[str, int]:
     """Return the contacts with too few elements across their radius in a step that ended in `state`, with this number."""
-    pairs = ((name, pair, step.contact[name]) for name, pair in problem.pairs.items())
-    in_contact = [(name, p, c) for name, p, c in pairs if c.active.any() and _carries_force(p, c, state)]
-    counts = ((name, _elements_across_radius(pair, contact)) for name, pair, contact in in_contact)
-    return {name: count for name, count in counts if count is not None and count < MIN_ELEMENTS_ACROSS_RADIUS}
+    counts = {name: _too_few_elements(pair, step.contact[name], state) for name, pair in problem.pairs.items()}
+    return {name: count for name, count in counts.items() if count}
 
 
-def _carries_force(pair: Formulation, contact: ContactResult, state: State) -> bool:
-    """Return whether a pair whose sides may separate carries a force."""
-    is_loaded = largest(contact.force_vectors) > SINGLE_PRECISION * state.largest_force
-    return pair.options.kind not in ALWAYS_CLOSED and is_loaded
+def _too_few_elements(pair: Formulation, contact: ContactResult, state: State) -> int:
+    """Return the number of elements across the radius of a contact that carries a force, or 0 if there are enough.
 
-
-def _elements_across_radius(pair: Formulation, contact: ContactResult) -> int | None:
-    """Return the result of `facets_across_radius` for a pair, in which open nodes between closed ones count as closed."""
+    Open nodes between closed ones count as closed.
+    """
+    is_loaded = contact.active.any() and largest(contact.force_vectors) > SINGLE_PRECISION * state.largest_force
+    if pair.options.kind in ALWAYS_CLOSED or not is_loaded:
+        return 0
     closed = _closed_or_enclosed(contact.active, pair.secondary)
-    return facets_across_radius(pair.secondary, closed, pair.excluded[pair.secondary.points])
+    count = facets_across_radius(pair.secondary, closed, pair.excluded[pair.secondary.points])
+    return count if count is not None and count < MIN_ELEMENTS_ACROSS_RADIUS else 0
 
 
 def facets_across_radius(side: Surface, closed: Mask, excluded: Mask) -> int | None:

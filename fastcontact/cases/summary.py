@@ -310,13 +310,13 @@ def _theory_lines(pair: str, theory: Mapping[str, Any], contact: Mapping[str, An
     if theory["equal_approach"]["approach"] is None:
         titles["equal_approach"] = "the given theory"
     formats = {"force": "force {:+.3%}", "pressure_max": "largest pressure {:+.3%}"}
+    formats["radius"] = contact["extent"] + " {:+.2%} to {:+.2%}"
     for key, values in theory.items():
-        known = {name: x for name, x in values["deviation"].items() if x is not None}
-        texts = [formats[name].format(x) for name, x in known.items() if name in formats]
-        if "radius" in known:
-            lower, upper = (bound / values["radius"] - 1.0 for bound in contact["radius"])
-            texts.append(f"{contact['extent']} {lower:+.2%} to {upper:+.2%}")
-        yield f"  contact '{pair}' against {titles[key]}: {', '.join(texts)}"
+        deviations = {name: [x] for name, x in values["deviation"].items() if x is not None}
+        if "radius" in deviations:
+            deviations["radius"] = [bound / values["radius"] - 1.0 for bound in contact["radius"]]
+        texts = ", ".join(formats[name].format(*x) for name, x in deviations.items())
+        yield f"  contact '{pair}' against {titles[key]}: {texts}"
 
 
 def _sensitivity_line(report: Mapping[str, Any]) -> str:

@@ -105,17 +105,13 @@ def _mesh_lines(mesh: Any) -> list[str]:
 
 def _result_lines(results: Any) -> Iterator[str]:
     """Yield lines on the versions, the completeness, the steps and the warnings of a result file."""
-    from fastcontact.results.step import coarse_contact_lines, warnings_of_run
-
     versions = ", ".join(f"{name} {version}" for name, version in results.versions.items())
     yield f"{len(results)} steps, {results.kinematics}; versions: {versions}"
     if results.error:
         yield f"  stopped: {results.error}"
     elif not results.complete:
         yield "  incomplete: the run was killed, or is still running"
-    iterations = {}
     for step in results:
-        iterations[step.index] = step.iterations
         closed = ", ".join(f"{name}: {int(c.active.sum())} nodes closed" for name, c in step.contact.items())
         counts = step.iterations
         yield (
@@ -126,8 +122,7 @@ def _result_lines(results: Any) -> Iterator[str]:
         if "substeps" in counts:
             ends = ", ".join(f"{end:.6g}" for end in counts["substeps"])
             yield f"    did not converge as a whole and was divided at the load factors {ends}"
-        yield from (f"    warning: {text}" for text in warnings_of_run(step.warnings, counts))
-    yield from (f"  {text}" for text in coarse_contact_lines(iterations).values())
+        yield from (f"    warning: {text}" for text in step.warnings)
     interfaces = results[-1].material_stress if len(results) else None
     if interfaces is not None:
         yield (

@@ -230,12 +230,11 @@ class Model(ModelSupports, metaclass=_PublicNames):
         motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.constraint_rows()))
         if not len(motions):
             return
-        work = [generalised_forces(motions, force.ravel()) for force in forces]
+        work = np.reshape([generalised_forces(motions, force.ravel()) for force in forces], (-1, len(motions)))
         # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
         gaps = gap_changes(self, motions, rigid_motions.LARGEST_FRICTION_FACTOR)
-        unstopped = mechanisms(gaps, np.reshape(work, (-1, len(motions))), motions.simple)
-        tipping_bodies = rigid_motions.tipping(motions, gaps, np.sum(work, axis=0)) if len(work) else ""
-        check_motions(self.mesh, motions.combined(unstopped), tipping_bodies)
+        unstopped = mechanisms(gaps, work, motions.simple)
+        check_motions(self.mesh, motions.combined(unstopped), rigid_motions.tipping(motions, gaps, work.sum(axis=0)))
 
 
 def gap_changes(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:

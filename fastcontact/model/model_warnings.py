@@ -84,16 +84,16 @@ def _insulating_contacts(model: Model) -> Iterator[str]:
     """Yield a warning if no contact of a model with heat conduction has a conductance, although temperatures differ."""
     if not model.heat_loads or any("conductance" in pair.options for pair in model.contact):
         return
-    given = [load.ambient if isinstance(load, Film) else load.value for load in model.heat_loads]
-    heated = any(isinstance(load, Heating) for load in model.heat_loads)
+    loads = [load for load in model.heat_loads if not isinstance(load, Heating)]
+    temperatures = {load.ambient if isinstance(load, Film) else load.value for load in loads}
     body = bodies(model.mesh)[1]
     of_two_bodies = [
         f"'{pair.name}'" for pair in model.contact
         if pair.obstacle is None
         and not np.isin(body[model.mesh.points_of(pair.secondary)], body[model.mesh.points_of(pair.primary)]).any()
     ]  # fmt: skip
-    is_uniform = all(isinstance(value, (int, float)) and value == given[0] for value in given)
-    if of_two_bodies and (heated or not is_uniform):
+    is_uniform = len(loads) == len(model.heat_loads) and len(temperatures) == 1 and not any(map(callable, temperatures))
+    if of_two_bodies and not is_uniform:
         yield (
             f"no heat flows across contact {', '.join(of_two_bodies)}, closed or not: give it a conductance, or "
             "conductance=0.0 if it insulates"

@@ -93,11 +93,9 @@ def nodal_stress_of_materials(
 MIN_ELEMENTS_ACROSS_RADIUS = 4
 
 
-def coarse_contact_text(name: str, *counts: int) -> str:
-    """Return the statement that a contact has only so many elements across its radius in one or several steps."""
-    low, high = min(counts), max(counts)
-    number = f"{low}" if low == high else f"{low} to {high}"
-    return f"contact '{name}' has only {number} {'elements' if high > 1 else 'element'} across its radius"
+def coarse_contact_text(name: str, count: int) -> str:
+    """Return the statement that a contact has only `count` elements across its radius."""
+    return f"contact '{name}' has only {count} {'elements' if count > 1 else 'element'} across its radius"
 
 
 def coarse_contact_notes(iterations: Mapping[str, Any]) -> list[str]:
@@ -114,26 +112,6 @@ def warnings_of_run(warnings: Iterable[str], iterations: Mapping[str, Any]) -> l
     """Return the `warnings` of a step that do not apply to this step only; `iterations` are those of the step."""
     notes = coarse_contact_notes(iterations)
     return [text for text in warnings if text not in notes]
-
-
-def coarse_contact_lines(iterations: Mapping[int, Mapping[str, Any]]) -> dict[str, str]:
-    """Return for each contact with too few elements across its radius a sentence on the steps in which this is the case.
-
-    `iterations` are `StepResult.iterations` of all steps, by the number of the step.
-    """
-    coarse: dict[str, dict[int, int]] = {}
-    for index, counts in iterations.items():
-        for name, count in counts.get("coarse_contacts", {}).items():
-            coarse.setdefault(name, {})[index] = count
-    lines = {}
-    for name, counts_of_pair in coarse.items():
-        first, last = min(counts_of_pair), max(counts_of_pair)
-        where = f"step {first}" if first == last else f"steps {first} to {last}"
-        if last - first + 1 > len(counts_of_pair):
-            where = f"{len(counts_of_pair)} of {len(iterations)} steps"
-        text = coarse_contact_text(name, *counts_of_pair.values())
-        lines[name] = f"{text} in {where}: pressures need {MIN_ELEMENTS_ACROSS_RADIUS} or more"
-    return lines
 
 
 # Fraction of the sum of the normal forces below which the resultant of a contact is negligible.

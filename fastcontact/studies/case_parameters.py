@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import copy
-import inspect
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from fastcontact.cases.keys import TOP_LEVEL
 from fastcontact.errors import CaseError, unknown
-from fastcontact.mesh.generate import GENERATORS
 from fastcontact.model.pair_options import SHARED_OPTIONS
 
-# Keys outside tables, each with a single value.
-SCALARS = tuple(key for key, kind in TOP_LEVEL.items() if kind in (str, (int, float)))
+# Keys outside tables that change results, each with a single value.
+SCALARS = ("kinematics", "reference_temperature", "strain")
 # A part of a path: a key and the indices that follow it in brackets.
 _PATH_PART = re.compile(r"([^.\[\]]+)((?:\[\d{1,9}\])*)$")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -32,9 +29,9 @@ def substitute(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, 
     linked = data.get("study", {}).get("parameters", {})
     for parameter, value in values.items():
         if parameter not in linked:
-            _set_value(case, parameter, value, [*linked, *case])
+            _set_value(case, parameter, value, linked)
         for path, law in linked.get(parameter, {}).items():
-            _set_value(case, path, law_value(law, value, f"study.parameters.{parameter}.'{path}'"), case)
+            _set_value(case, path, law_value(law, value, f"study.parameters.{parameter}.'{path}'"), ())
     return case
 
 
@@ -63,9 +60,7 @@ def _set_value(data: dict[str, Any], path: str, value: Any, names: Iterable[str]
     if pairs and path in ("friction", *SHARED_OPTIONS):
         raise CaseError(f"'{path}' belongs to a pair: write {' or '.join(f'{pair}.{path}' for pair in pairs)}")
     if len(keys) == 1 and path not in SCALARS:
-        values = [name for name in names if not isinstance(data.get(name), (dict, list))]
-        raise CaseError(unknown("parameter", path, {*values, *SCALARS} - {"title"}))
-    _check_left_out_list(data, keys, path)
+        raise CaseError(unknown("parameter", path, [*names, *SCALARS]))
     entry: Any = data
     for key in keys[:-1]:
         entry = _member(entry, key, path)
@@ -74,30 +69,9 @@ def _set_value(data: dict[str, Any], path: str, value: Any, names: Iterable[str]
         _member(entry, last, path)
     current = entry[last] if isinstance(entry, list) else entry.get(last)
     if isinstance(current, (dict, list)):
-        example = _first_value(path, current)
+        example = f"{path}[0]" if isinstance(current, list) else f"{path}.{next(iter(current), 'KEY')}"
         raise CaseError(f"'{path}' is a table or a list of the case: name a single value in it, such as {example}")
     entry[last] = value
-
-
-def _first_value(path: str, entry: Any) -> str:
-    """Return the path of the first single value in a table or a list at a path."""
-    while isinstance(entry, (dict, list)) and entry:
-        key = next(iter(entry)) if isinstance(entry, dict) else 0
-        path, entry = f"{path}.{key}" if isinstance(entry, dict) else f"{path}[0]", entry[key]
-    return path
-
-
-def _check_left_out_list(data: Mapping[str, Any], keys: Sequence[str | int], path: str) -> None:
-    """Raise CaseError if a path refers to a list of numbers of a mesh generator that the case leaves out."""
-    generator = data.get("mesh", {}).get("generator")
-    if keys[0] != "mesh" or generator not in GENERATORS or keys[1] in data["mesh"]:
-        return
-    argument = inspect.signature(GENERATORS[generator]).parameters.get(str(keys[1]))
-    if argument is not None and str(argument.annotation).startswith("tuple["):
-        raise CaseError(
-            f"'mesh.{keys[1]}' is a list, which the case leaves out: write it in the case file, and name a single value in "
-            f"it, such as mesh.{keys[1]}[0]"
-        )
 
 
 def _keys(path: str) -> list[str | int]:

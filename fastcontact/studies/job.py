@@ -44,8 +44,6 @@ COMMON_KEYS = {
 }
 # Version of the results in a store, incremented when the quantities or their form change.
 SCHEMA = 7
-# Tables and keys of a case file that do not change the result of a run; meshes are those of its recipe.
-UNREAD_TABLES = ("title", "units", "check", "sensitivity", "modes")
 # A function of the last step, or of the list of all steps if its argument has the name `STEPS_ARGUMENT`.
 Measure = Callable[..., float]
 # Names of quantities, or functions by the name of their quantity.
@@ -109,7 +107,6 @@ class Job(Run):
     base: Mesh | None  # mesh of the case, if it is read from a file
     folder: Path = Path()  # folder to which file names in the case are relative
     substituted: dict[str, Any] = field(default_factory=dict)  # case before the settings of the study were applied
-    formulation: str | None = None  # formulation of all contact pairs that the settings select
 
     @cached_property  # the contents of the files are hashed once, at the start of a study
     def key(self) -> str:
@@ -122,7 +119,8 @@ class Job(Run):
     @property
     def inputs(self) -> dict[str, Any]:
         """All inputs of the run, except for the mesh `base` and the contents of files."""
-        data = {key: value for key, value in self.data.items() if key not in ("mesh", *UNREAD_TABLES)}
+        unread = ("mesh", "title", "units", "check", "sensitivity", "modes")
+        data = {key: value for key, value in self.data.items() if key not in unread}
         data["theory"] = {pair: theory for pair, theory in data.get("theory", {}).items() if pair == self.pair}
         return {"data": data, "pair": self.pair, "recipe": self.recipe}
 
@@ -208,7 +206,7 @@ def job_of(case: Case, setup: Settings, combination: Combination, level: int, **
     base = case.mesh if setup.generator is None else None
     return Job(
         name=case.name, data=data, pair=setup.pair, recipe=mesh, base=base, substituted=setup.data,
-        formulation=combination.formulation, folder=case.folder, **fields,
+        folder=case.folder, **fields,
     )  # fmt: skip
 
 

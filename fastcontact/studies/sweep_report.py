@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -96,22 +95,20 @@ class Drawing:
 
         If all values of the quantity are positive, the y axis has the scale of the x axis; otherwise it is linear.
         """
-        theories: dict[bytes, tuple[Any, Any, dict[str, Any]]] = {}  # distinct curves, by their values
+        distinct = not set(self.curve_parameters) <= self.sweep.constant_in(quantity).keys()
         for k, (label, points) in enumerate(self.points_of.items()):
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(self._x(points), y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
+            if k and not distinct:  # all curves have the same theory
+                continue
+            name = (self.theory_label + self._constant_note(quantity)) if k == 0 else None
+            style = {"label": name, "color": f"C{k}" if distinct else "black"}
             curves = (curve for curve in self.sweep.theories if curve.label == label and quantity in curve.values)
-            exact = np.array([point.theory.get(quantity, math.nan) for point in points])
-            x: Any = self._x(points)
-            style: dict[str, Any] = {"ls": "", "marker": "_", "ms": 9}
+            exact = [point.theory.get(quantity, math.nan) for point in points]
             if (curve := next(curves, None)) is not None:
-                x, exact, style = curve.x, curve.values[quantity], {"ls": "--", "lw": 1.1}
-            if np.isfinite(exact).any():
-                shared = exact.tobytes() in theories or not self.curve_parameters
-                theories[exact.tobytes()] = x, exact, {**style, "color": "black" if shared else f"C{k}"}
-        name = self.theory_label + self._constant_note(quantity)
-        for k, (x, exact, style) in enumerate(theories.values()):
-            ax.plot(x, exact, label=name if k == 0 else None, **style)
+                ax.plot(curve.x, curve.values[quantity], "--", lw=1.1, **style)
+            elif np.isfinite(exact).any():
+                ax.plot(self._x(points), exact, "_", ms=9, **style)
         positive = all(point.values.get(quantity, 1.0) > 0 for point in self.sweep.points)
         scale = self.scale if positive else "linear"
         label = column(title(quantity), quantity, self.sweep.units)
@@ -266,51 +263,40 @@ class Sweep(Report):
         remarks += [f"{label_of(choice)} failed: {text}" for choice, text in self.failed]
         return remarks + [self._constant_theory_remark(name) for name in self.theory_independent_of]
 
-    def constant_in(self, quantity: str) -> list[str]:
-        """Return the parameters with several values on which the theory of a quantity does not depend."""
-        names = [name for name, values in self.parameters.items() if len(set(values)) > 1]
-        sets = {name: [{p.theory.get(quantity) for p in points} for points in self._groups(name)] for name in names}
-        return [name for name in names if sets[name] and all(len(v) == 1 and None not in v for v in sets[name])]
+    def constant_in(self, quantity: str) -> dict[str, bool]:
+        """Return the parameters on which the theory of a quantity does not depend.
 
-    def _groups(self, parameter: str) -> list[list[Point]]:
-        """Return the points in groups of several points that differ in a parameter only."""
-        groups: dict[str, list[Point]] = {}
-        for point in self.points:
-            others = [name for name in point.parameters if name != parameter]
-            groups.setdefault(label_of(point.parameters, others), []).append(point)
-        return [points for points in groups.values() if len(points) > 1]
+        The values are whether the parameter changes the quantity by more than one per cent; prescribed forces do not change.
+        """
+        found = {}
+        for name in self.parameters:
+            groups: dict[str, list[Point]] = {}  # points that differ in this parameter only
+            for point in self.points:
+                others = [other for other in self.parameters if other != name]
+                groups.setdefault(label_of(point.parameters, others), []).append(point)
+            several = [points for points in groups.values() if len(points) > 1]
+            theories = [{point.theory.get(quantity) for point in points} for points in several]
+            if several and all(len(exact) == 1 and None not in exact for exact in theories):
+                values = [[point.values.get(quantity, math.nan) for point in points] for points in several]
+                found[name] = any(np.ptp(row) > NOTABLE * np.max(np.abs(row)) for row in values)
+        return found
 
     @property
     def theory_independent_of(self) -> list[str]:
         """Parameters that change a main quantity by more than one per cent, but not its theory."""
-        found = dict.fromkeys(
-            name
-            for quantity in self._main_quantities()
-            for name in self.constant_in(quantity)
-            if any(_differ([p.values.get(quantity, math.nan) for p in points]) for points in self._groups(name))
-        )
-        return [name for name in self.parameters if name in found]
+        constant = [self.constant_in(quantity) for quantity in self._main_quantities()]
+        return [name for name in self.parameters if any(found.get(name) for found in constant)]
 
     def _constant_theory_remark(self, parameter: str) -> str:
         """Return the remark that the theory does not depend on a parameter, and how it can be made to."""
-        remark = f"the theory does not depend on {parameter}"
-        if any(isinstance(value, (str, bool)) for value in self.parameters[parameter]):
-            return remark
-        case, pair = tomllib.loads(self.text), self.pairs[0]
-        linked = case.get("study", {}).get("parameters", {}).get(parameter)
-        names = {path.rpartition(".")[2] for path in linked or (parameter,)}
-        keys = [key for key in case["theory"][pair] if key.rstrip("0123456789") in names] or ["KEY"]
-        entries = ", ".join(f'"theory.{pair}.{key}" = "value"' for key in keys)
-        if linked:
-            return f"{remark}: if it should, add {entries} to [study.parameters.{parameter}]"
-        entries = f'"{parameter}" = "value", {entries}'
-        return f"{remark}: if it should, sweep NAME of a table [study.parameters.NAME] with {entries}"
+        numeric = not any(isinstance(value, (str, bool)) for value in self.parameters[parameter])
+        remedy = f": if it should, let a name in [study.parameters] also set keys of [theory.{self.pairs[0]}]"
+        return f"the theory does not depend on {parameter}{remedy if numeric else ''}"
 
     def with_pair(self, label: str, quantity: str) -> str:
         """Return a label of a quantity, with the name of its contact pair if there are several pairs."""
-        of_pair = len(self.pairs) > 1 and "study.contact" not in self.parameters
-        of_pair = of_pair and quantity in LABELS and quantity != "von_mises_max"
-        return f"{label} of '{self.pairs[0]}'" if of_pair else label
+        several = len(self.pairs) > 1 and "study.contact" not in self.parameters
+        return f"{label} of '{self.pairs[0]}'" if several and quantity in {*LABELS} - {"von_mises_max"} else label
 
     def figure(self) -> Any:
         """Return a Matplotlib figure with the values against a parameter and their ratios to theory.
@@ -358,11 +344,6 @@ class Sweep(Report):
             for comparison, label in differences.items():
                 columns.append((label, [percent(point.ratio(name, comparison) - 1.0) for point in self.points]))
         return [(self.combination if self.combination != self.title else "", to_rows(columns))]
-
-
-def _differ(values: Sequence[float]) -> bool:
-    """Return whether values differ notably, which prescribed forces do not."""
-    return bool(np.ptp(values) > NOTABLE * np.max(np.abs(values)))
 
 
 def _point_dict(point: Point) -> dict[str, Any]:

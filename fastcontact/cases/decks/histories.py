@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices, largest
+from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.blocks import Block, Location, key_of
 from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
@@ -174,7 +174,7 @@ class Histories(Generic[Key]):
         start_factor, start_time = float(number - 1), self.time
         self.time += step.period
         current = self.initial | self.step_values if self.initial else self.step_values
-        self._compare_repeated()
+        self._compare_repeated(current.values())
         changed: dict[tuple[Any, ...], Track] = {}
         for key in (*current, *self.removals):
             previous, baseline, new = self.tracks.get(key), self.baseline.get(key, self.default), current.get(key)
@@ -197,12 +197,9 @@ class Histories(Generic[Key]):
             track.add(_amplitude_points(*continued[track], start_factor, start_time, step.period))
         self.step_values, self.initial, self.removals, self.fixed_keys = {}, {}, {}, set()
 
-    def _compare_repeated(self) -> None:
-        """Raise CaseError if two values of a key differ by more than round-off of the largest value."""
-        if not self.repeated:
-            return
-        values = (*self.initial.values(), *self.step_values.values())
-        round_off = ROUND_OFF * largest(np.array([value.value for value in values]))
+    def _compare_repeated(self, values: Iterable[Value]) -> None:
+        """Raise CaseError if two values of a key differ by more than round-off of the largest of the `values` of the step."""
+        round_off = ROUND_OFF * max((abs(value.value) for value in values), default=0.0)
         for earlier, value in self.repeated:
             if earlier.amplitude != value.amplitude or abs(earlier.value - value.value) > round_off:
                 raise value.location.error(

@@ -52,10 +52,8 @@ def contacts(
     # The legend is beside the axes.
     margin = LETTER_WIDTH * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
     height = max(height, 1.0 + 2 * LINE_HEIGHT * min(len(found_contacts), MAX_NAMED))
-    if mesh.dim == 2:
-        width = max(width, 4.2 * float(np.ptp(points[:, 0]) / np.ptp(points, axis=0).max()) + 1.1 + margin)
-    else:
-        width += margin
+    across = 4.2 * float(np.ptp(points[:, 0]) / np.ptp(points, axis=0).max()) + 1.1 if mesh.dim == 2 else width
+    width = max(width, across + margin)
     axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
     if mesh.dim == 2:
         _draw_2d(axes, found_contacts)
@@ -71,10 +69,9 @@ def contacts(
         title = f"the first {MAX_NAMED}, and {others} more" if others > 0 else None
         handles = axes.get_legend_handles_labels()[0][: 2 * MAX_NAMED]
         options = {"handles": handles, "title": title, "fontsize": "small", "title_fontsize": "small"}
-        if ax is None:  # the box of the axes may be smaller than the legend
-            axes.figure.legend(loc="outside right upper", **options)
-        else:
-            axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), **options)
+        # The box of the axes may be smaller than the legend.
+        place = {"loc": "outside right upper"} if ax is None else {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0)}
+        (axes.figure if ax is None else axes).legend(**options, **place)
     return axes if mesh.dim == 2 or ax is not None else lay_out(axes)
 
 

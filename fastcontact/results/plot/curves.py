@@ -19,7 +19,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import points_of_solids
 from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import MODEL_UNITS, Axes, Units, contacts_of, new_axes, outer_legend, units_of
-from fastcontact.results.step import ContactResult, StepResult, coarse_contact_lines, half_width
+from fastcontact.results.step import MIN_ELEMENTS_ACROSS_RADIUS, ContactResult, StepResult, half_width
 from fastcontact.results.units import axis_label, units_of_results, value_text
 
 
@@ -418,8 +418,9 @@ def history(
         units = units_of_results(units, "plane_strain")
     upper.set(ylabel=axis_label("sum of the normal forces" if cancels else "contact force", units, "force"))
     upper.set_title(title or f"Contact '{pair}' against the load", fontsize="medium")
-    coarse = coarse_contact_lines({step.index: step.iterations for step in steps})
-    lower.set_title(coarse.get(pair, ""), fontsize="small")
+    if coarse := sum(pair in step.iterations.get("coarse_contacts", {}) for step in steps):
+        count = f"in {coarse} of {len(steps)} steps"
+        lower.set_title(f"fewer than {MIN_ELEMENTS_ACROSS_RADIUS} elements across the radius {count}", fontsize="small")
     abscissa = axis_label("approach", units, "length") if approach else "load factor"
     extent = "contact radius" if contacts[-1].extent == "radius" else "half-width of the contact"
     lower.set(xlabel=abscissa, ylabel=axis_label(extent, units, "length"))

@@ -560,7 +560,5 @@ def test_a_contact_that_stays_open_is_drawn_without_closed_nodes():
     )
     upper, lower = fc.plot.history([step], "made")
     assert lower.get_legend() is None
-    assert lower.get_title() == (
-        "contact 'made' has only 1 element across its radius in step 1: pressures need 4 or more"
-    )
+    assert lower.get_title() == "fewer than 4 elements across the radius in 1 of 1 steps"
     assert list(upper.lines[0].get_ydata()) == [0.0]
