@@ -21,9 +21,8 @@ PRESS_AND_PULL = fc.Ramp((1.0, 2.0), ((0.0, 0.0), (1.0, 1.0), (2.0, -1.0)))
 @each
 def test_a_uniform_tension_passes(formulation, options, kind, kinematics, swap):
     apart = formulation == "mortar"  # the only one that meshes which do not match pass exactly
-    mesh = (
-        boxes(upper=(3, 2, 2) if apart else (2, 3, 2)) if kinematics == "3d" else blocks(upper=(4 if apart else 3, 2))
-    )
+    solids = boxes(upper=(3, 2, 2) if apart else (2, 3, 2)), blocks(upper=(4 if apart else 3, 2))
+    mesh = solids[0] if kinematics == "3d" else solids[1]
     model = touching(held(mesh, kinematics, -0.02), formulation, swap, kind=kind, **options)
     last = fc.solve(model, fc.linear_ramp(1))[-1]
     axis, expected = (2 if kinematics == "3d" else 1), MODULUS[kinematics] * 0.002

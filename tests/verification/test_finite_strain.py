@@ -341,15 +341,11 @@ def test_following_pressure_is_the_derivative_of_a_volume(kinematics: str, eleme
     from fastcontact.elasticity.loads import Pressure
 
     if kinematics == "3d":
-        mesh, names = (
-            fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), element=element),
-            ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX"),
-        )
+        mesh = fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), element=element)
+        names = ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX")
     else:
-        mesh, names = (
-            fc.generate.block((1.0, 1.0), (1, 1), element=element, origin=(1.0, 0.0)),
-            ("BOTTOM", "RIGHT", "TOP", "LEFT"),
-        )
+        mesh = fc.generate.block((1.0, 1.0), (1, 1), element=element, origin=(1.0, 0.0))
+        names = ("BOTTOM", "RIGHT", "TOP", "LEFT")
     u, along = 0.1 * np.random.default_rng(0).normal(size=(2, *mesh.points.shape))
     pressures = [FollowerPressure(mesh, kinematics, Pressure(name, 2.0)) for name in names]
 

@@ -261,9 +261,8 @@ def test_heat_of_friction_leaves_through_films():
         contact = step.contact["c"]
         shear = float(np.abs(contact.force[0]))
         assert shear == pytest.approx(0.3 * np.abs(contact.force[1]), rel=0.01)
-        speed, elastic = (
-            (1.0, 0.05) if step.load_factor == 2.0 else (0.5, 2e-3)
-        )  # what blocks shear at first is no slip
+        # What blocks shear at first is no slip.
+        speed, elastic = (1.0, 0.05) if step.load_factor == 2.0 else (0.5, 2e-3)
         assert step.heat["friction"] == pytest.approx(0.9 * shear * speed, rel=elastic)
         assert step.heat["films"] == pytest.approx(-step.heat["friction"], rel=1e-10)
         assert step.temperature.min() > 0.0

@@ -82,10 +82,8 @@ def test_every_write_may_be_the_last_one(
             finished = sum(end <= number for end in ends)
             with open_results(crashed) as results:
                 assert finished <= len(results) <= finished + 1
-                several = (
-                    {0, len(results) // 2, *range(max(len(results) - 8, 0), len(results), 2)} if len(results) else ()
-                )
-                for which in several:
+                count = len(results)
+                for which in {0, count // 2, *range(max(count - 8, 0), count, 2)} if count else ():
                     assert_same(results[which], nth_step(which), f"write {number}, step {which}")
                 expected = [nth_step(which).load_factor for which in range(len(results))]
                 assert list(results.load_factors) == expected
