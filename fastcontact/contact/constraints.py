@@ -88,7 +88,8 @@ class NodalField(Protocol):
         `side` is the secondary side; there is an array for each block of its facets. `usable` (m,) are the constraints that
         can close.
         """
-        return [np.where(usable[block.local], 0.0, 1.0) for block in side.blocks]
+        uncovered = np.clip(1.0 - np.broadcast_to(self.covered, self.nodal_areas.shape), 0.0, 1.0)
+        return [uncovered[block.local] for block in side.blocks]
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
         """Return nodal gaps and the node of each constraint.

@@ -3,9 +3,10 @@
 A node is open to the fluid if its contact pressure is at most the fluid pressure or, in the first pairing, if its gap is
 open. Open nodes of the same facet are connected. At open nodes that are connected with the source, the fluid pressure
 replaces the contact pressure. The fluid acts on each side along the normals of this side and over its own area, because the
-areas within the front of the fluid differ between the sides unless the gap is small. The pressure on the primary side is that
-at the closest point of the secondary side. With finite strains, normals and areas are those of the deformed surfaces at which
-the bodies are linearised, and their variation enters the tangent.
+areas within the front of the fluid differ between the sides unless the gap is small. This includes the part of the secondary
+side that faces no primary facet. The pressure at a point of the primary side is that at its projection on the secondary side
+along averaged normals. With finite strains, normals and areas are those of the deformed surfaces at which the bodies are
+linearised, and their variation enters the tangent.
 """
 
 from __future__ import annotations
@@ -249,7 +250,6 @@ def with_fluid_pressure(
         # A node under contact pressure is impermeable, even if it is open itself and only points near it are closed. Contact
         # pressures are forces per reference area.
         nominal = config.fluid_pressure * (1.0 if deformation is None else np.linalg.norm(vectors, axis=1))
-        facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
         is_open = nodal_gap > -NARROW * facet_size
         passable = is_open & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
         if config.impermeable is not None:
@@ -260,10 +260,10 @@ def with_fluid_pressure(
     uncovered = constraints.nodal_field.uncovered(side, constraints.usable)
     first_of_node = np.zeros(len(node), bool)
     first_of_node[np.unique(node, return_index=True)[1]] = True
-    carriers = np.zeros(len(wetted), bool)
+    partly_uncovered = np.zeros(len(wetted), bool)
     for block, fraction in zip(side.blocks, uncovered, strict=True):
-        carriers[block.local[fraction > SINGLE_PRECISION]] = True
-    rows = wetted[node] & (constraints.usable | (first_of_node & carriers[node]))
+        partly_uncovered[block.local[fraction > SINGLE_PRECISION]] = True
+    rows = wetted[node] & (constraints.usable | (first_of_node & partly_uncovered[node]))
     row_areas = np.where(constraints.usable, constraints.areas, facet_size ** (points.shape[1] - 1))
     # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
     # much larger than the side.
@@ -272,7 +272,7 @@ def with_fluid_pressure(
     force_by_node = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(wetted)))
     nodal_force = force_by_node.sum(axis=0)
     facets, transmitted = list[WettedFacets](), np.ones(len(wetted))
-    if (wetted & carriers).any():
+    if (wetted & partly_uncovered).any():
         facets.append(WettedFacets.uncovered(areas, pressure, uncovered, nodal_force > 0.0))
     if primary is not None and (nodal_force > 0.0).any():
         current = points + config.displacement

@@ -141,7 +141,7 @@ class PressureField(NodalField):
     def uncovered(self, side: Surface, usable: Mask) -> list[Array]:
         """Return the complement of `covered` or, at permanent points, the fraction of unusable ones; see `NodalField`."""
         if self.has_new_points:
-            return [np.clip(1.0 - self.covered[block.local], 0.0, 1.0) for block in side.blocks]
+            return super().uncovered(side, usable)
         numbers = np.unique(np.vstack([side.all_local, self.facet_nodes]), axis=0, return_inverse=True)[1].ravel()
         of_facet, of_point = np.split(numbers, [side.n_facets])
         areas, n = self.projection.areas, int(numbers.max()) + 1

@@ -618,10 +618,6 @@ class WeightedPressures(NodalField):
         fraction = np.divide(self.weight, self.full_areas, out=np.zeros_like(self.weight), where=has_area)
         return self._at_nodes(fraction, keep_with_gap=True)
 
-    def uncovered(self, side: Surface, usable: Mask) -> list[Array]:
-        """Return the complement of `covered`; see `NodalField`."""
-        return [np.clip(1.0 - self.covered[block.local], 0.0, 1.0) for block in side.blocks]
-
     def side_pressure(self, force: Array) -> Array:
         """Return the forces divided by the complete areas of the test functions; see `_at_nodes`.
 

@@ -126,6 +126,10 @@ class NodalForces(NodalField):
     independent: Indices | None = None
     mass: SuperLU | None = None
 
+    def uncovered(self, side: Surface, usable: Mask) -> list[Array]:
+        """See `NodalField`; the complete area of a node without an opposite facet is uncovered."""
+        return [np.where(usable[block.local], 0.0, 1.0) for block in side.blocks]
+
     def pressure(self, force: Array) -> Array:
         """Return nodal pressures (n_nodes,) [pressure] for nodal forces (n_nodes,) [force].
 

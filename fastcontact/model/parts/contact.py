@@ -221,9 +221,10 @@ class ModelContact(ModelConnections):
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where the contact
         pressure does not exceed the fluid pressure. There the fluid pressure acts on both sides, along the normals of each
-        side; on the primary side, it acts on the area that faces the wetted part of the secondary side. At finite strain,
-        normals and areas are those of the deformed surfaces. The pressure at each secondary node is the attribute
-        ``fluid_pressure`` of the contact result. To apply the fluid pressure to other surfaces, use `add_pressure`.
+        side: on the secondary side also where it faces no primary facet, and on the primary side on the area that faces the
+        wetted part of the secondary side. At finite strain, normals and areas are those of the deformed surfaces. The
+        pressure at each secondary node is the attribute ``fluid_pressure`` of the contact result. To apply the fluid pressure
+        to other surfaces, use `add_pressure`.
 
         Parameters
         ----------
