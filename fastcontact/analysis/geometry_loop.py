@@ -15,8 +15,10 @@ of second order.
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -30,16 +32,13 @@ from fastcontact.analysis.friction_increments import FrictionIncrements
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
-from fastcontact.analysis.tolerances import RESIDUAL, ScatterWindow, Tolerances
+from fastcontact.analysis.tolerances import DECLINE, RESIDUAL, WINDOW, ScatterWindow, Tolerances
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import Constraints, Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Smallest number of pairings after which edges of facets are rounded, because pairings are assumed to alternate. It matters
-# if `max_geometry_updates` is less than twice as large; without rounding, `test_equilibrium_is_found_in_space` fails.
-UPDATES_BEFORE_ROUNDING = 25
 # Safety factor for the contraction of changes by the next solution, which is estimated from the last Newton step. With 0.03,
 # steps are omitted too early: random models 9 and 14 take 4 pairings (2 with 3).
 SAFETY = 3.0
@@ -195,7 +194,7 @@ def _settle(
             return replace(settled, scatter=scatter)
         iterate.u[problem.dofs.active] = mixing.next(settled, before, displacement, tolerance, inexact)
         tolerances.tighten(relative_change, solution.residual)
-        is_slow = update >= max(limit // 2, UPDATES_BEFORE_ROUNDING) and not iterate.rounded
+        is_slow = not iterate.rounded and (update >= limit // 2 or _stagnates(iterate.history[-WINDOW:]))
         if is_slow and any(pair.may_alternate(constraints.parts[name]) for name, pair in problem.pairs.items()):
             log.info("pairings alternate: edges of facets are now rounded, and small overlaps carry no constraint")
             iterate.rounded = True
@@ -210,6 +209,12 @@ def _settle(
         return _settle(step, iterate, increments)
     last_change = (limit, relative_change) if limit and not criteria.keep_pairing else None
     return SettledContact(constraints, solution, iterate, last_change, nodes=nodes)
+
+
+def _stagnates(history: Sequence[dict[str, Any]]) -> bool:
+    """Return whether the changes of the displacements do not decrease over the last pairings in the `history`."""
+    changes = [entry["displacement_change"] for entry in history]
+    return len(changes) >= WINDOW and np.median(changes[WINDOW // 2 :]) >= DECLINE * np.median(changes[: WINDOW // 2])
 
 
 def _store_solution(

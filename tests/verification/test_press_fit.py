@@ -183,6 +183,7 @@ def test_curved_sides_need_averaged_normals():
     """Opposite a node the normal of either facet is off by half their angle: the pairing flips until edges are rounded."""
     with pytest.warns(fc.FastcontactWarning, match='normals="averaged" makes this unnecessary'):
         model, last = quarter("quad8", 8, 12, "node_to_segment", clearance=-INTERFERENCE, normals="facet")
+    assert last.iterations["geometry_updates"] <= 20
     assert abs(errors(model, last)[1]) < 5e-4
     model, last = quarter("quad8", 8, 12, "node_to_segment", clearance=-INTERFERENCE, normals="averaged")
     assert last.iterations["geometry_updates"] <= 10
