@@ -103,6 +103,9 @@ class ContactResultants:
         Normal force divided by area, and the largest nodal pressure [pressure].
     dissipation, friction_work : float
         Work of friction in this step, and accumulated over all steps [energy].
+    worn_volume : float
+        Volume worn off the secondary side in all steps; zero without the option ``wear`` of the pair [length^3]. In 2D it
+        is per unit thickness [length^2]; in axisymmetry it is that of the full circle.
 
     Examples
     --------
@@ -130,6 +133,7 @@ class ContactResultants:
     pressure_max: float
     dissipation: float
     friction_work: float
+    worn_volume: float = 0.0
 
     _repr_html_ = fields_table
 
@@ -177,7 +181,9 @@ def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> 
         if model.strain == "finite":
             areas = lumped_areas(pair.secondary, pair.points + step.displacement, pair.axisymmetric)
         work += contact.dissipation
-        resultants.append(_resultants(contact, areas * _covered_fraction(pair, step, name), pair.axisymmetric, work))
+        volume = 0.0 if contact.wear is None else float(areas @ contact.wear)
+        of_step = _resultants(contact, areas * _covered_fraction(pair, step, name), pair.axisymmetric, work)
+        resultants.append(replace(of_step, worn_volume=volume))
     return resultants
 
 
@@ -232,7 +238,8 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     -------
     structured ndarray (n_steps,)
         ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in 3D ``moment_x`` ...; ``area``; ``centre_x`` ...;
-        ``normal_force``, ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
+        ``normal_force``, ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``,
+        ``worn_volume``.
 
     Examples
     --------

@@ -192,7 +192,7 @@ def test_wear_of_two_bodies_and_of_an_obstacle_that_moves():
 def test_with_friction_the_volume_of_wear_is_the_work_over_the_coefficient(element):
     """``sum of areas times depth = k W / mu``: pressure times slip is all that both know of."""
     mu = 0.2
-    model = column(element, (8, 4), friction=mu)
+    model = column(element, (8, 4), friction=mu, wear=WEAR)
     pressed(model, 0.01, ramp=RAMP_DOWN)
     model.prescribe("TOP", x=0.05, ramp=RAMP_ALONG)
     steps = fc.solve(model, [1.0, 3.0, 5.0, 7.0, 9.0])
@@ -204,6 +204,7 @@ def test_with_friction_the_volume_of_wear_is_the_work_over_the_coefficient(eleme
     assert not contact.sticking.any()
     mean = np.trapezoid(depth[-1][np.argsort(contact.coordinates[:, 0])], np.sort(contact.coordinates[:, 0]))
     assert mean == pytest.approx(WEAR * answers[-1].friction_work / mu, rel=0.05)
+    assert [a.worn_volume for a in answers] == pytest.approx([WEAR * a.friction_work / mu for a in answers], rel=0.05)
 
 
 def test_history_is_a_table_and_the_summary_tells(tmp_path, root):
