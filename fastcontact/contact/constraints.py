@@ -75,6 +75,13 @@ class NodalField(Protocol):
         """
         return self.pressure(force) * self.covered
 
+    def at_nodes(self, coefficients: Array) -> Array:
+        """Return the nodal values (n_nodes,) of a field with `coefficients` (n_nodes,).
+
+        They are the coefficients unless the functions by which the forces of the nodes are weighted are no shape functions.
+        """
+        return coefficients
+
     def nodal_forces(self, force: Array) -> Array:
         """Return the normal forces `force` (m,) of the constraints, distributed to the nodes (n_nodes,) [force].
 
@@ -85,10 +92,13 @@ class NodalField(Protocol):
     def uncovered(self, side: Surface, usable: Mask) -> list[Array]:
         """Return the fraction (n_facets, n_nodes) of the area of each node where no contact is possible [-].
 
+        The fractions are nodal values of a field, whose integral is the area where no contact is possible. They may be
+        negative on quadratic facets.
+
         `side` is the secondary side; there is an array for each block of its facets. `usable` (m,) are the constraints that
         can close.
         """
-        uncovered = np.clip(1.0 - np.broadcast_to(self.covered, self.nodal_areas.shape), 0.0, 1.0)
+        uncovered = self.at_nodes(np.clip(1.0 - np.broadcast_to(self.covered, self.nodal_areas.shape), 0.0, 1.0))
         return [uncovered[block.local] for block in side.blocks]
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:

@@ -11,6 +11,8 @@ linearised, and their variation enters the tangent.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.sparse import csr_array, diags_array, eye_array, kron
 from scipy.sparse.csgraph import connected_components
@@ -97,28 +99,21 @@ class WettedFacets:
         Reference coordinates of all points [length].
     pressure : tuple of ndarray (n_facets, n_q)
         Fluid pressure at the points of the `fine_rule`, for each block of facets [pressure].
-    node : tuple of ndarray of int (n_facets, n_q)
-        Secondary node whose constraints transmit the force at each of these points.
     """
 
     side: Surface
     axisymmetric: bool
     points: Array
     pressure: tuple[Array, ...]
-    node: tuple[Indices, ...]
 
     @classmethod
-    def opposite(
-        cls, primary: Surface, areas: AreaVectors, displacement: Array, nodal_pressure: Array, carriers: Mask
-    ) -> WettedFacets:
+    def opposite(cls, primary: Surface, areas: AreaVectors, displacement: Array, nodal_pressure: Array) -> WettedFacets:
         """Return the part of a `primary` side that faces the wetted part of the secondary side, at a `displacement`.
 
-        `nodal_pressure` (n_nodes,) are the fluid pressures at the secondary nodes [pressure]. The mask `carriers` (n_nodes,)
-        marks the nodes with wetted constraints, which transmit the force.
+        `nodal_pressure` (n_nodes,) are the fluid pressures at the secondary nodes [pressure].
         """
-        side, current, pressures, nodes = areas.side, areas.points + displacement, list[Array](), list[Indices]()
-        carrier_numbers = np.flatnonzero(carriers)
-        tree, deformed = KDTree(areas.points[side.points[carrier_numbers]]), DeformedSide(side, current)
+        side, current, pressures = areas.side, areas.points + displacement, list[Array]()
+        deformed = DeformedSide(side, current)
         project = along_normals if current.shape[1] == 3 else along_line_normals
         for block in primary.blocks:
             element, xi = elements.get(block.element), fine_rule(block.element)[0]
@@ -134,51 +129,48 @@ class WettedFacets:
             fraction = np.clip(2.0 - overhang / SMALL_OVERHANG, 0.0, 1.0) * ~faces_away
             at_feet = np.einsum("nk,nk->n", on_side.shape, nodal_pressure[on_side.local])
             pressures.append((fraction * at_feet).reshape(shape))
-            reference = np.einsum("nk,nkd->nd", on_side.shape, areas.points[on_side.nodes])
-            nodes.append(carrier_numbers[tree.query(reference)[1]].reshape(shape))
-        return cls(primary, areas.axisymmetric, areas.points, tuple(pressures), tuple(nodes))
+        return cls(primary, areas.axisymmetric, areas.points, tuple(pressures))
 
     @classmethod
-    def uncovered(
-        cls, areas: AreaVectors, nodal_pressure: Array, fractions: list[Array], carriers: Mask
-    ) -> WettedFacets:
+    def uncovered(cls, areas: AreaVectors, nodal_pressure: Array, fractions: list[Array]) -> WettedFacets:
         """Return the parts of the secondary side where no contact is possible; for the parameters see `opposite`.
 
         `fractions` contains the uncovered fraction of the area of each node (n_facets, n_nodes) [-] for each block of facets.
         """
-        pressures, nodes = list[Array](), list[Indices]()
+        pressures = list[Array]()
         for block, fraction in zip(areas.side.blocks, fractions, strict=True):
             N = elements.get(block.element).shape(fine_rule(block.element)[0])
             pressures.append(nodal_pressure[block.local] * fraction @ N.T)
-            nearest = np.where(carriers[block.local][:, None], np.abs(N), -1.0).argmax(axis=2)
-            nodes.append(np.take_along_axis(block.local, nearest, axis=1))
-        return cls(areas.side, areas.axisymmetric, areas.points, tuple(pressures), tuple(nodes))
+        return cls(areas.side, areas.axisymmetric, areas.points, tuple(pressures))
 
-    def by_node(self, displacement: Array, n_nodes: int) -> csr_array:
-        """Return minus the nodal forces that each secondary node transmits (n_nodes, n_dofs) [force]."""
-        dim, blocks = self.points.shape[1], list[Blocks]()
-        for block, pressure, node in zip(self.side.blocks, self.pressure, self.node, strict=True):
-            element, (xi, weights) = elements.get(block.element), fine_rule(block.element)
-            N, x = element.shape(xi), (self.points + displacement)[block.facets]
-            vectors = area_vectors(x, element.gradient(xi)) * (pressure * weights)[:, :, None]
-            if self.axisymmetric:
-                vectors *= (2.0 * np.pi * x[:, :, 0] @ N.T)[:, :, None]
-            dofs = np.repeat((block.facets[:, :, None] * dim + np.arange(dim)).reshape(len(x), -1), len(xi), axis=0)
-            forces = np.einsum("qa,fqd->fqad", N, vectors).reshape(len(dofs), 1, -1)
-            blocks.append((node.reshape(-1, 1), dofs, forces))
-        return assembled(blocks, (n_nodes, self.points.size))
+    def by_node(self, displacement: Array, secondary: Surface, carriers: Mask) -> csr_array:
+        """Return minus the nodal forces that each secondary node transmits (n_nodes, n_dofs) [force].
+
+        The node nearest to a facet among `carriers` (n_nodes,) transmits its force.
+        """
+        blocks, numbers = list[Blocks](), np.flatnonzero(carriers)
+        tree = KDTree(self.points[secondary.points[numbers]])
+        for block, (dofs, by_facet, _) in zip(self.side.blocks, self._by_block(displacement), strict=True):
+            nearest = numbers[tree.query(self.points[block.facets].mean(axis=1))[1]]
+            blocks.append((nearest[:, None], dofs, by_facet[:, None]))
+        return assembled(blocks, (len(carriers), self.points.size))
 
     def with_derivative(self, displacement: Array) -> tuple[Array, csr_array]:
         """Return minus the nodal forces (n_points, dim) [force], and their derivative (n_dofs, n_dofs) [force / length]."""
-        dim, forces, blocks = self.points.shape[1], np.zeros_like(self.points), list[Blocks]()
+        forces, blocks = np.zeros(self.points.size), list[Blocks]()
+        for dofs, by_facet, derivative in self._by_block(displacement):
+            np.add.at(forces, dofs, by_facet)
+            blocks.append((dofs, dofs, derivative))
+        return forces.reshape(self.points.shape), assembled(blocks, (self.points.size, self.points.size))
+
+    def _by_block(self, displacement: Array) -> Iterator[tuple[Indices, Array, Array]]:
+        """Yield for each block the numbers of the displacement components, minus the forces, and their derivatives."""
         for block, pressure in zip(self.side.blocks, self.pressure, strict=True):
             element, (xi, weights) = elements.get(block.element), fine_rule(block.element)
             N, dN, x = element.shape(xi), element.gradient(xi), (self.points + displacement)[block.facets]
             by_facet, derivative = weighted_area_vectors(x, N, dN, pressure * weights, N, self.axisymmetric)
-            np.add.at(forces, block.facets, by_facet)
-            dofs = (block.facets[:, :, None] * dim + np.arange(dim)).reshape(len(x), -1)
-            blocks.append((dofs, dofs, derivative.reshape(*dofs.shape, -1)))
-        return forces, assembled(blocks, (self.points.size, self.points.size))
+            dofs = (block.facets[:, :, None] * x.shape[2] + np.arange(x.shape[2])).reshape(len(x), -1)
+            yield dofs, by_facet.reshape(dofs.shape), derivative.reshape(*dofs.shape, -1)
 
 
 @record
@@ -262,7 +254,7 @@ def with_fluid_pressure(
     first_of_node[np.unique(node, return_index=True)[1]] = True
     partly_uncovered = np.zeros(len(wetted), bool)
     for block, fraction in zip(side.blocks, uncovered, strict=True):
-        partly_uncovered[block.local[fraction > SINGLE_PRECISION]] = True
+        partly_uncovered[block.local[np.abs(fraction) > SINGLE_PRECISION]] = True
     rows = wetted[node] & (constraints.usable | (first_of_node & partly_uncovered[node]))
     row_areas = np.where(constraints.usable, constraints.areas, facet_size ** (points.shape[1] - 1))
     # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
@@ -271,21 +263,21 @@ def with_fluid_pressure(
     force = np.where(rows, config.fluid_pressure * row_areas, 0.0)
     force_by_node = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(wetted)))
     nodal_force = force_by_node.sum(axis=0)
-    facets, transmitted = list[WettedFacets](), np.ones(len(wetted))
-    if (wetted & partly_uncovered).any():
-        facets.append(WettedFacets.uncovered(areas, pressure, uncovered, nodal_force > 0.0))
-    if primary is not None and (nodal_force > 0.0).any():
+    carriers, facets, transmitted = nodal_force > 0.0, list[WettedFacets](), np.ones(len(wetted))
+    if carriers.any() and (wetted & partly_uncovered).any():
+        facets.append(WettedFacets.uncovered(areas, constraints.nodal_field.at_nodes(pressure), uncovered))
+    if primary is not None and carriers.any():
         current = points + config.displacement
         x, opposite = current[side.points], primary.node_positions(current)
         transmitted = _transmitted_fraction(x, nodal_gap, vectors, opposite, facet_size)
-        direct_pressure = pressure * (1.0 - transmitted)
-        facets.append(WettedFacets.opposite(primary, areas, config.displacement, direct_pressure, nodal_force > 0.0))
+        direct_pressure = constraints.nodal_field.at_nodes(pressure * (1.0 - transmitted))
+        facets.append(WettedFacets.opposite(primary, areas, config.displacement, direct_pressure))
     B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node], transmitted[node])
     if facets:
-        per_force = rows / np.where(nodal_force > 0.0, nodal_force, np.inf)[node]
+        per_force = rows / np.where(carriers, nodal_force, np.inf)[node]
         to_rows = csr_array((per_force, (np.arange(len(node)), node)), shape=force_by_node.shape)
         for part in facets:
-            B = csr_array(B - to_rows @ part.by_node(linearised_at, len(wetted)))
+            B = csr_array(B - to_rows @ part.by_node(linearised_at, side, carriers))
         B.eliminate_zeros()
     soft = distance_to_zero / (config.fluid_pressure * row_areas)
     return replace(

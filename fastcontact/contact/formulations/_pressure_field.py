@@ -141,7 +141,7 @@ class PressureField(NodalField):
     def uncovered(self, side: Surface, usable: Mask) -> list[Array]:
         """Return the complement of `covered` or, at permanent points, the fraction of unusable ones; see `NodalField`."""
         if self.has_new_points:
-            return super().uncovered(side, usable)
+            return [1.0 - self.covered[block.local] for block in side.blocks]
         numbers = np.unique(np.vstack([side.all_local, self.facet_nodes]), axis=0, return_inverse=True)[1].ravel()
         of_facet, of_point = np.split(numbers, [side.n_facets])
         areas, n = self.projection.areas, int(numbers.max()) + 1
@@ -155,17 +155,18 @@ class PressureField(NodalField):
         return self.pressure(force) * self.covered_areas
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
-        """Return the means of gaps, weighted by shape functions and areas; see `NodalField`.
+        """Return the means of gaps, weighted by areas and positive values of shape functions; see `NodalField`.
 
-        The mean at a node is zero if the points around it are closed, although the gap at the node itself may be open. For
-        corners of quadratic facets that have no area, the mean is infinite, and no point belongs to them.
+        The mean at a node is zero if the points around it are closed, although the gap at the node itself may be open.
+        Negative weights are omitted. With them, the weights at a corner of a quadratic facet may sum to nearly zero, so that
+        the mean could have any value.
         """
         usable, n = np.isfinite(gaps), len(self.nodal_areas)
-        weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
+        weight = np.where(usable, self.projection.areas, 0.0)[:, None] * np.maximum(self.shape, 0.0)
         total = np.bincount(self.facet_nodes.ravel(), weight.ravel(), n)
         sums = np.bincount(self.facet_nodes.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
         valid = nodes_with_area(total, [self.facet_nodes])
-        largest = np.where(valid[self.facet_nodes], self.shape, -np.inf).argmax(axis=1)
+        largest = (self.shape + 2.0 * valid[self.facet_nodes]).argmax(axis=1)
         nearest = self.facet_nodes[np.arange(len(gaps)), largest]
         return np.divide(sums, total, out=np.full(n, np.inf), where=valid), nearest
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, Linearised, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
@@ -196,6 +196,13 @@ class WeightedMortar(Formulation):
         # Tied pairs have separate equations for the directions in which both sides are held.
         no_slip = directions_without_slip(self, config) if self.has_tangents and self.options.kind != "tied" else []
         constraints, slip_data = self._weighted_gaps(config, means, no_slip)
+        nodal = constraints.nodal
+        if self.options.source is not None and self.multipliers == "dual" and isinstance(nodal, WeightedPressures):
+            of_blocks = zip(self._test, means.coverage.overlap.mass, strict=True)
+            tests = [(np.broadcast_to(T, mass.shape), T @ mass) for T, mass in of_blocks]
+            B, gap0 = self._gaps(config, self._means_of(means.coverage._replace(functions=tests), means.normal))
+            test_gaps = gap0 + B @ config.displacement.ravel()
+            constraints = replace(constraints, nodal=replace(nodal, test_gaps=test_gaps))
         return replace(constraints, geometry=partial(self._linearised, config, means, no_slip, constraints, slip_data))
 
     def _weighted_gaps(
@@ -205,15 +212,8 @@ class WeightedMortar(Formulation):
 
         `no_slip` are the `directions_without_slip`. The data are None without tangents.
         """
-        coverage, D, M, weight, motion, gap_reduction, normal = means
-        B = rows_of(motion, normal)
-        gap0 = B @ self.points.ravel() - np.einsum("nd,nd->n", gap_reduction, normal)
-        if (added := self._added_gap(config, D, M)) is not None:
-            gap0 += self._normal_components(config, means) * added / weight
-        dependent = coverage.nodal_map.diagonal() == 0.0
-        if dependent.any():  # Gaps that supports prescribe must not contribute to the gaps of neighbouring nodes.
-            prescribed = np.where(dependent, self.nodal_gap(config)[0], 0.0)
-            gap0 -= csr_array(D[:, self.secondary.points]) @ prescribed / weight
+        coverage, _, _, weight, motion, _, normal = means
+        B, gap0 = self._gaps(config, means)
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
         nodal_map, constants = coverage.nodal_map, self._constant_attributes
         pressures = WeightedPressures(weight, nodal_map, nodal_map.T @ constants[0], *constants[1:])
@@ -240,6 +240,19 @@ class WeightedMortar(Formulation):
         constraints = replace(constraints, tangents=slips, directions=directions, friction=mu, slip0=slip0)
         return constraints, SlipData(np.stack(slip_axes), length, substitutions)
 
+    def _gaps(self, config: Configuration, means: Means) -> tuple[csr_array, Array]:
+        """Return the rows B (m, n_dofs) [-] and the gaps (m,) at u = 0 [length] of weighted means."""
+        coverage, D, M, weight, motion, gap_reduction, normal = means
+        B = rows_of(motion, normal)
+        gap0 = B @ self.points.ravel() - np.einsum("nd,nd->n", gap_reduction, normal)
+        if (added := self._added_gap(config, D, M)) is not None:
+            gap0 += self._normal_components(config, means) * added / weight
+        dependent = coverage.nodal_map.diagonal() == 0.0
+        if dependent.any():  # Gaps that supports prescribe must not contribute to the gaps of neighbouring nodes.
+            prescribed = np.where(dependent, self.nodal_gap(config)[0], 0.0)
+            gap0 -= csr_array(D[:, self.secondary.points]) @ prescribed / weight
+        return B, gap0
+
     def _means(self, config: Configuration, earlier: Coverage | None = None) -> Means:
         """Return the weighted means in a configuration.
 
@@ -253,12 +266,15 @@ class WeightedMortar(Formulation):
             coverage = self._coverage(overlap, weights, with_gap, nodal_map)
         else:
             coverage = self._coverage(overlap, weights, earlier.with_gap, earlier.nodal_map)
+        return self._means_of(coverage, self._mean_normals(overlap, config))
+
+    def _means_of(self, coverage: Coverage, normal: Array) -> Means:
+        """Return the weighted means of a coverage, with the `normal` (m, dim) of each node [-]."""
         D, M, gap_reduction = self._weighted_integrals(coverage)
         # The gap of an excluded node is omitted, but the functions of its neighbours are not extended over its area.
         sums = np.where(self.excluded[self.secondary.points], 0.0, np.asarray(D.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         motion = scaled(csr_array(D - M), 1.0 / weight)
-        normal = self._mean_normals(overlap, config)
         return Means(coverage, D, M, weight, motion, gap_reduction / weight[:, None], normal)
 
     def _linearised(
@@ -598,6 +614,8 @@ class WeightedPressures(NodalField):
         shape functions [-], and the nodes of the facets, numbered on the side.
     held : ndarray of bool (m,)
         Nodes that are prescribed in all directions. Their forces act between supports, independently of their neighbours.
+    test_gaps : ndarray (m,), optional
+        Gaps weighted with the test functions, for dual multipliers and contacts that a fluid may enter [length].
     """
 
     weight: Array
@@ -606,27 +624,38 @@ class WeightedPressures(NodalField):
     nodal_areas: Array
     quadratic: list[tuple[int, Array, NDArray[np.signedinteger]]]
     held: Mask
+    test_gaps: Array | None = None
+
+    def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
+        """Return nodal gaps, see `NodalField`; negative ones are replaced by `test_gaps` if these are larger.
+
+        Dual functions are negative in a part of the facets. Where the gap varies strongly, as opposite the rim of a sphere, a
+        gap that is open everywhere may have a negative mean, but not with test functions, which are positive.
+        """
+        if self.test_gaps is not None:
+            gaps = np.where(gaps < 0.0, np.maximum(gaps, self.test_gaps), gaps)
+        return super().weighted_gaps(gaps)
 
     def pressure(self, force: Array) -> Array:
         """Return forces divided by areas; at mid-side nodes without a gap, means of the pressures at the corners."""
-        return self._at_nodes(force / self.weight, keep_with_gap=True)
+        return self.at_nodes(force / self.weight, keep_with_gap=True)
 
     @property
     def covered(self) -> Array:
         """Covered fraction of the nodal areas; at mid-side nodes without a gap, the mean of the corners."""
         has_area = np.isfinite(self.weight) & (self.full_areas > 0.0)
         fraction = np.divide(self.weight, self.full_areas, out=np.zeros_like(self.weight), where=has_area)
-        return self._at_nodes(fraction, keep_with_gap=True)
+        return self.at_nodes(fraction, keep_with_gap=True)
 
     def side_pressure(self, force: Array) -> Array:
-        """Return the forces divided by the complete areas of the test functions; see `_at_nodes`.
+        """Return the forces divided by the complete areas of the test functions; see `at_nodes`.
 
         The covered part of the area of a node may be arbitrarily small, and the force vanishes with it. The ratio of the
         force and the covered area is sensitive to round-off, unlike the force divided by the complete area.
         """
-        return self._at_nodes(np.divide(force, self.full_areas, out=np.zeros_like(force), where=self.full_areas > 0.0))
+        return self.at_nodes(np.divide(force, self.full_areas, out=np.zeros_like(force), where=self.full_areas > 0.0))
 
-    def _at_nodes(self, coefficients: Array, keep_with_gap: bool = False) -> Array:
+    def at_nodes(self, coefficients: Array, keep_with_gap: bool = False) -> Array:
         """Return the nodal values (m,) of a field with `coefficients` (m,) of the test functions.
 
         They are the coefficients themselves, except at mid-side nodes of quadratic facets, where the functions of the corners
