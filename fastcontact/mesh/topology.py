@@ -67,7 +67,7 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
 def _check_folds(mesh: Mesh) -> None:
     """Raise MeshError if two oriented solid cells have a common facet with the same orientation."""
     facet_keys, owners = [], []
-    for kind, nodes, numbers in facets_of_cells(mesh):
+    for kind, (nodes, numbers) in facets_of_cells(mesh).items():
         facet_keys.append(_oriented_keys(nodes[:, : elements.get(kind).n_corners].astype(np.int64)))
         owners.append(numbers)
     keys, owner = np.concatenate(facet_keys), np.concatenate(owners)
@@ -157,12 +157,8 @@ def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
 @cached_by_mesh
 def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Numbers]]:
     """Return `outer_facets`, `cells_joined_by_facets` and `cells_of_outer_facets`."""
-    by_kind: dict[str, list[tuple[Numbers, Numbers]]] = {}
-    for kind, nodes, numbers in facets_of_cells(mesh):
-        by_kind.setdefault(kind, []).append((nodes, numbers))
     outer, cell_numbers, pairs = {}, {}, [np.empty((2, 0), np.int32)]
-    for name, blocks in by_kind.items():
-        facets, owner = map(np.concatenate, zip(*blocks, strict=True))
+    for name, (facets, owner) in facets_of_cells(mesh).items():
         pair_rows = np.stack(equal_rows(np.sort(facets, axis=1)))
         single = np.ones(len(facets), bool)
         single[pair_rows] = False

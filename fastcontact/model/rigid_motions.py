@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._tools.grouping import grouped
 from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
@@ -118,9 +119,8 @@ class FreeMotions:
         """
         by_body: dict[str, list[str]] = {}
         for column in _column_echelon_form(self.weights).T:
-            rows_of_body: dict[str, list[int]] = {}
-            for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()).tolist():
-                rows_of_body.setdefault(self.labels[i].body, []).append(i)
+            moving_rows = np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()).tolist()
+            rows_of_body = grouped((self.labels[i].body, i) for i in moving_rows)
             together: dict[tuple[str, bytes], list[str]] = {}  # bodies, or parts of a body that move as one
             for body, rows in rows_of_body.items():
                 motion = np.round(self._at_origin(column, rows), 6) + 0.0  # no negative zeros

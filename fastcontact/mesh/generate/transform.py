@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.grouping import grouped
 from fastcontact._tools.neighbours import close_pairs
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
@@ -178,10 +179,7 @@ def union(*meshes: Mesh) -> Mesh:
 
 def _merge(groups_of_meshes: Iterable[Groups]) -> Groups:
     """Return the concatenated arrays of several meshes by name."""
-    by_name: dict[str, list[AnyArray]] = {}
-    for groups in groups_of_meshes:
-        for name, values in groups.items():
-            by_name.setdefault(name, []).append(values)
+    by_name = grouped(entry for groups in groups_of_meshes for entry in groups.items())
     return {name: np.concatenate(arrays) for name, arrays in by_name.items()}
 
 
