@@ -343,9 +343,14 @@ class Mesh(NameSuggestions):
         return self.with_groups(cells={name: np.concatenate([self.cell_groups[member] for member in members])})
 
 
+def vector_text(vector: Array, digits: int = 6) -> str:
+    """Return the components of a vector or position (dim,) in parentheses, for messages."""
+    return f"({', '.join(f'{x:.{digits}g}' for x in vector)})"
+
+
 def node_at(mesh: Mesh, node: int) -> str:
     """Return the number and the position of a node for messages."""
-    return f"point {node} at ({', '.join(f'{x:.6g}' for x in mesh.points[node])})"
+    return f"point {node} at {vector_text(mesh.points[node])}"
 
 
 def facets_of_cells(mesh: Mesh) -> dict[str, tuple[AnyArray, AnyArray]]:

@@ -23,7 +23,7 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import FastcontactError, MeshError
 from fastcontact.mesh import elements, quadrature
-from fastcontact.mesh.mesh import Mesh, facets_of_cells
+from fastcontact.mesh.mesh import Mesh, facets_of_cells, vector_text
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
@@ -74,9 +74,9 @@ def _check_folds(mesh: Mesh) -> None:
     first_rows, second_rows = equal_rows(keys)
     if len(first_rows):
         first, second = sorted((int(owner[first_rows[0]]), int(owner[second_rows[0]])))
-        position = ", ".join(f"{x:.6g}" for x in mesh.points[keys[first_rows[0]][:2]].mean(axis=0))
+        position = vector_text(mesh.points[keys[first_rows[0]][:2]].mean(axis=0))
         raise MeshError(
-            f"cells {first} and {second} lie on the same side of the facet between them, near ({position}), one of "
+            f"cells {first} and {second} lie on the same side of the facet between them, near {position}, one of "
             f"{len(first_rows)} such pairs: the mesh is folded there; move its nodes or remesh"
         )
 
