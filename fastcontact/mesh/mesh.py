@@ -343,7 +343,7 @@ class Mesh(NameSuggestions):
         return self.with_groups(cells={name: np.concatenate([self.cell_groups[member] for member in members])})
 
 
-def vector_text(vector: Array, digits: int = 6) -> str:
+def vector_text(vector: Iterable[float], digits: int = 6) -> str:
     """Return the components of a vector or position (dim,) in parentheses, for messages."""
     return f"({', '.join(f'{x:.{digits}g}' for x in vector)})"
 
