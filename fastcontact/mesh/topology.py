@@ -23,6 +23,7 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import FastcontactError, MeshError
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.flat_pieces import flat_pieces
 from fastcontact.mesh.mesh import Mesh, facets_of_cells, vector_text
 
 Result = TypeVar("Result")
@@ -270,8 +271,7 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
     blocks = mesh.cells_of(group, dim=1)
     if not blocks:
         raise MeshError(f"group '{group}' contains no line cells, so its nodes have no order along a line")
-    pieces = [block[:, [0, 2, 1]] if block.shape[1] == 3 else block for block in blocks.values()]
-    segments = np.concatenate([np.column_stack([p[:, i], p[:, i + 1]]) for p in pieces for i in range(p.shape[1] - 1)])
+    segments = np.concatenate([b[:, flat_pieces(b.shape[1], dim=2)].reshape(-1, 2) for b in blocks.values()])
     nodes, local = np.unique(segments, return_inverse=True)
     local = local.reshape(segments.shape)
     degree = np.bincount(local.ravel(), minlength=len(nodes))
