@@ -133,10 +133,8 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
 def _resultants(case: Case, last: StepResult, pair: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the contact resultants of a pair in the last step, and its frictional work in all `steps` [energy]."""
     (resultants,) = contact_resultants(case.model, [last], pair)
-    return {
-        **{name: _json_value(getattr(resultants, name)) for name in RESULTANTS},
-        "friction_work": sum(step.get("dissipation", {}).get(pair, 0.0) for step in steps),
-    }
+    friction_work = sum(step.get("dissipation", {}).get(pair, 0.0) for step in steps)
+    return {**{name: _json_value(getattr(resultants, name)) for name in RESULTANTS}, "friction_work": friction_work}
 
 
 def _json_value(value: Any) -> Any:

@@ -242,9 +242,8 @@ def _penetration(model: Model, pairs: Pairs, prescribed: Array) -> Iterator[str]
             continue  # the penetration is an interference, which loads the bodies
         gap, normal = initial_gaps(bound)
         approach = np.abs(normal) @ motion
-        approach = np.where(
-            approach > SINGLE_PRECISION * motion.max(), approach, SAG * bound.secondary.largest_diameters(bound.points)
-        )
+        sag = SAG * bound.secondary.largest_diameters(bound.points)
+        approach = np.where(approach > SINGLE_PRECISION * motion.max(), approach, sag)
         row = int(np.argmin(gap + approach))
         if -gap[row] > approach[row]:
             point = bound.secondary.points[row]

@@ -66,10 +66,8 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
         block = mesh.cells[name]
         is_new = beyond_cut[start : start + len(block), None] & (new_node[block] >= 0)
         cells[name] = np.where(is_new, new_node[block], block)
-    point_groups = {
-        name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
-        for name, members in mesh.point_groups.items()
-    }
+    on_cut = {name: members[new_node[members] >= 0] for name, members in mesh.point_groups.items()}
+    point_groups = {name: np.append(members, new_node[on_cut[name]]) for name, members in mesh.point_groups.items()}
     positions = np.concatenate([mesh.points, mesh.points[points]])
     cut_mesh = mesh.replace(points=positions, cells=cells, point_groups=point_groups)
     return cut_mesh.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
