@@ -194,11 +194,10 @@ def solid_cells(mesh: Mesh) -> SolidCells:
     counts = [len(block) for block in blocks.values()]
     sizes = np.repeat([block.shape[1] for block in blocks.values()], counts)
     nodes = [block.ravel() for block in blocks.values()]
-    return SolidCells(
-        connectivity=np.concatenate([np.empty(0, np.int64), *nodes], dtype=np.int64),
-        offsets=np.concatenate([[0], np.cumsum(sizes)], dtype=np.int64, casting="unsafe"),
-        types=np.repeat(np.array([elements.get(name).vtk for name in blocks], np.uint8), counts),
-    )
+    connectivity = np.concatenate([np.empty(0, np.int64), *nodes], dtype=np.int64)
+    offsets = np.concatenate([[0], np.cumsum(sizes)], dtype=np.int64, casting="unsafe")
+    types = np.repeat(np.array([elements.get(name).vtk for name in blocks], np.uint8), counts)
+    return SolidCells(connectivity, offsets, types)
 
 
 def xdmf_topology(mesh: Mesh) -> Numbers | None:

@@ -169,12 +169,9 @@ def union(*meshes: Mesh) -> Mesh:
     cells = _merge({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in shifted)
     starts = starts_of(cells)
     numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
-    return Mesh(
-        np.concatenate([mesh.points for mesh in meshes]),
-        cells,
-        _merge({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
-        _merge({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in shifted),
-    )
+    cell_groups = ({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers)
+    point_groups = ({name: members + n for name, members in mesh.point_groups.items()} for mesh, n in shifted)
+    return Mesh(np.concatenate([mesh.points for mesh in meshes]), cells, _merge(cell_groups), _merge(point_groups))
 
 
 def _merge(groups_of_meshes: Iterable[Groups]) -> Groups:
