@@ -367,6 +367,17 @@ def finite_vector(values: Any, size: int) -> np.ndarray[Any, np.dtype[np.float64
     return vector if vector.shape == (size,) and np.isfinite(vector).all() else None
 
 
+def unit_vector(
+    kind: str, values: Any, owner: str, size: int, error: type[FastcontactError]
+) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return the unit vector (size,) along `values`, or raise `error`; messages call it the `kind` of its `owner`."""
+    vector = finite_vector(values, size)
+    length = 0.0 if vector is None else float(np.linalg.norm(vector))
+    if vector is None or not 0.0 < length < math.inf:
+        raise error(f"the {kind} {values} of {owner} must be {size} numbers, not all zero")
+    return np.asarray(vector / length)
+
+
 def number_pairs(rows: Any) -> np.ndarray[Any, np.dtype[np.float64]] | None:
     """Return pairs of numbers as an array (n, 2), or None if `rows` are not pairs of numbers."""
     try:

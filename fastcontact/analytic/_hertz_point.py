@@ -112,12 +112,8 @@ class HertzPoint:
 def _solve(bodies: Bodies, R: float, name: str, value: float) -> HertzPoint:
     """Return the contact in which the quantity called `name` has the given value."""
     E_star = bodies.E_star
-    laws = {
-        "radius": (1.0, 1.0),
-        "approach": (1.0 / R, 2.0),
-        "force": (4.0 / 3.0 * E_star / R, 3.0),
-        "pressure_max": (2.0 * E_star / (math.pi * R), 1.0),
-    }
+    force, pressure = 4.0 / 3.0 * E_star / R, 2.0 * E_star / (math.pi * R)
+    laws = {"radius": (1.0, 1.0), "approach": (1.0 / R, 2.0), "force": (force, 3.0), "pressure_max": (pressure, 1.0)}
     return HertzPoint(bodies, E_star, R, **quantities(laws, name, value))
 
 

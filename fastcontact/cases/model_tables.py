@@ -146,14 +146,9 @@ def keys_of_list(kind: str) -> tuple[dict[str, Any], list[str]]:
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     """Return the model of the parsed `data` of a case file; paths in the data are relative to `folder`."""
     mesh = _add_references(_cut_sections(mesh, data.get("pretension", [])), data.get("coupling", []))
-    model = Model(
-        mesh,
-        data["kinematics"],
-        case_text=text,
-        strain=data.get("strain", "small"),
-        reference_temperature=float(data.get("reference_temperature", 0.0)),
-        units=data.get("units", {}),
-    )
+    options: dict[str, Any] = {"strain": data.get("strain", "small"), "units": data.get("units", {})}
+    reference = float(data.get("reference_temperature", 0.0))
+    model = Model(mesh, data["kinematics"], text, reference_temperature=reference, **options)
     _add_lists(model, data, folder, _ADD)
     _add_contacts(model, data)
     for name, entry in data.get("obstacle", {}).items():

@@ -12,6 +12,7 @@ from fastcontact.analysis.resultants import contact_resultants
 from fastcontact.cases.case import Case, Label
 from fastcontact.cases.checks import contact_at_point, default_target, outcome
 from fastcontact.errors import ModelError
+from fastcontact.mesh.mesh import vector_text
 from fastcontact.model.rigid_motions import grouped_by_body
 from fastcontact.results.step import ContactResult, StepResult, force_text
 from fastcontact.results.units import units_of_results, value_text, with_unit
@@ -132,10 +133,8 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
 def _resultants(case: Case, last: StepResult, pair: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the contact resultants of a pair in the last step, and its frictional work in all `steps` [energy]."""
     (resultants,) = contact_resultants(case.model, [last], pair)
-    return {
-        **{name: _json_value(getattr(resultants, name)) for name in RESULTANTS},
-        "friction_work": sum(step.get("dissipation", {}).get(pair, 0.0) for step in steps),
-    }
+    friction_work = sum(step.get("dissipation", {}).get(pair, 0.0) for step in steps)
+    return {**{name: _json_value(getattr(resultants, name)) for name in RESULTANTS}, "friction_work": friction_work}
 
 
 def _json_value(value: Any) -> Any:
@@ -210,16 +209,12 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     for name, contact in summary["contact"].items() if loaded else ():
         texts += _contact_lines(name, contact, units)
     for name, section in steps[-1].get("pretension", {}).items():
-        texts.append(
-            f"  pretension '{name}': force {value_text(section['force'], units, 'force', 6)}, shortened by "
-            + value_text(section["shortening"], units, "length", 6)
-        )
+        force = value_text(section["force"], units, "force", 6)
+        shortening = value_text(section["shortening"], units, "length", 6)
+        texts.append(f"  pretension '{name}': force {force}, shortened by {shortening}")
     if loaded:
-        position = ", ".join(f"{x:.4g}" for x in peak["at"])
-        texts.append(
-            f"  largest von Mises stress {value_text(peak['value'], units, 'pressure', 6)} at "
-            + with_unit(f"({position})", units, "length")
-        )
+        stress = value_text(peak["value"], units, "pressure", 6)
+        texts.append(f"  largest von Mises stress {stress} at {with_unit(vector_text(peak['at'], 4), units, 'length')}")
     for name, (low, high) in summary.get("cell_fields", {}).items():
         texts.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
     if heat := summary.get("heat"):
@@ -271,13 +266,11 @@ def _contact_lines(name: str, contact: Mapping[str, Any], units: Mapping[str, st
         f"{value_text(contact['pressure_max'], units, 'pressure', 6)}, {_extent_text(contact['extent'], lower, upper, units)}"
     )
     if any(contact["obstacle_displacement"] or ()):
-        components = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
-        yield f"  obstacle '{name}' is displaced by {with_unit(f'({components})', units, 'length')}"
+        displacement = with_unit(vector_text(contact["obstacle_displacement"]), units, "length")
+        yield f"  obstacle '{name}' is displaced by {displacement}"
     if "torque" in contact:
-        yield (
-            f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} rad, with a torque of "
-            + value_text(contact["torque"], units, "moment", 6)
-        )
+        torque = value_text(contact["torque"], units, "moment", 6)
+        yield f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} rad, with a torque of {torque}"
     if "wear_max" in contact:
         yield f"  contact '{name}' is worn by up to {value_text(contact['wear_max'], units, 'length')}"
     if contact["penalty"] is not None:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastcontact._tools.paths import PathLike
+from fastcontact._tools.paths import PathLike, checked_target, is_stream, replacing
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
@@ -28,8 +28,6 @@ def check_outputs(
     Raises FileError if a folder is missing or write-protected, if a path is a folder, an input file or another output, or
     if the format of a picture is unknown; FastcontactError if Matplotlib is missing.
     """
-    from fastcontact._tools.paths import checked_target, is_stream
-
     picture_paths = [str(path) for path in pictures if path]
     input_ids = {_identity(Path(os.path.realpath(path))) for path in input_files if path}
     output_ids: set[object] = set()
@@ -71,8 +69,6 @@ def _check_formats(paths: list[str]) -> None:
 
 def write_text(path: str, content: str) -> None:
     """Write a string to a stream or atomically to a file; FileError if it cannot be written."""
-    from fastcontact._tools.paths import replacing
-
     with replacing(path) as target:
         target.write_text(content, encoding="utf-8")
 
@@ -93,8 +89,6 @@ def save(axes: Any, path: str) -> None:
 
     Each warning of Matplotlib, for example about a character that is missing in a font, is printed in one line.
     """
-    from fastcontact._tools.paths import replacing
-
     try:
         with warnings.catch_warnings(record=True) as caught_warnings, replacing(path) as target:
             warnings.simplefilter("always", UserWarning)

@@ -7,6 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from fastcontact._tools.paths import replacing
 from fastcontact.cli._outputs import say_written
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
@@ -55,8 +56,6 @@ def _lines(path: Path) -> list[str]:
 
 def copy_case(case_path: Path, target: Path) -> list[Path]:
     """Copy a case file and its mesh files, if it has any, and return the new paths. Raises FileError if a path exists."""
-    from fastcontact._tools.paths import replacing
-
     text = case_path.read_text(encoding="utf-8")
     mesh_table: dict[str, Any] = tomllib.loads(text).get("mesh", {})
     files = {target: text.encode()}

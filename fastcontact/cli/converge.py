@@ -39,10 +39,8 @@ def run(options: Namespace) -> int:
     if options.adaptive:
         return _run_adaptive(options)
     elements, formulations, quantities = map(_study.split, (options.elements, options.formulations, options.quantities))
-    study = _study.run_interruptibly(
-        options,
-        partial(convergence_study, options.case, options.levels, elements, formulations, quantities=quantities or ()),
-    )
+    study_of_case = partial(convergence_study, options.case, options.levels, elements, formulations)
+    study = _study.run_interruptibly(options, partial(study_of_case, quantities=quantities or ()))
     failures = [text for series in study.series for text in series.failed.values()] + list(study.failed.values())
     return _study.report(options, study, HINT, failures)
 

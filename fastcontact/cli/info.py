@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from fastcontact._tools.paths import existing_file
 from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
@@ -87,8 +88,6 @@ def _is_case(path: Path) -> bool:
     """Return whether a file is a case file, or an Abaqus file with steps, parts or included files in addition to a mesh."""
     if path.suffix.lower() != ".inp":
         return path.suffix.lower() == ".toml"
-    from fastcontact._tools.paths import existing_file
-
     keywords = ("*STEP", "*PART", "*INCLUDE")
     with open(existing_file(path), encoding="utf-8", errors="replace") as file:
         return any(line.lstrip().upper().startswith(keywords) for line in file)

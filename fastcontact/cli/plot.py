@@ -133,6 +133,5 @@ def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str,
     if theory is None or not hasattr(theory, "stress_on_axis"):
         return {}
     state = {"approach": case["approach"].get(name), "load": _results.load_multiplier(case["ramp"], step)}
-    return _results.theories_at_equal_load("theory", theory, step.contact[name], theories["share"], **state) or {
-        "theory": theory
-    }
+    curves = _results.theories_at_equal_load("theory", theory, step.contact[name], theories["share"], **state)
+    return curves or {"theory": theory}

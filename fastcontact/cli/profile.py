@@ -101,11 +101,7 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
         x = np.unique(np.concatenate([position[[0, -1]], np.linspace(max(-end, min(position[0], 0.0)), end, 200)]))
         curves.append(Curve(x, curve.pressure(np.abs(x)), label))
     start = "axis" if contact.measured_from_axis else "middle of the contact"
-    write_agr(
-        path,
-        curves,
-        title=case["title"] or f"Contact '{contact.name}'",
-        subtitle=f"load factor {step.load_factor:g}",
-        xlabel=axis_label(f"distance from the {start}", contact.units, "length"),
-        ylabel=axis_label("contact pressure", contact.units, "pressure"),
-    )
+    title, subtitle = case["title"] or f"Contact '{contact.name}'", f"load factor {step.load_factor:g}"
+    xlabel = axis_label(f"distance from the {start}", contact.units, "length")
+    ylabel = axis_label("contact pressure", contact.units, "pressure")
+    write_agr(path, curves, title=title, subtitle=subtitle, xlabel=xlabel, ylabel=ylabel)

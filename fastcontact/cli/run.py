@@ -178,9 +178,8 @@ def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary_
     content = f"keeps {steps}: 'fastcontact run --resume' continues from there"
     error.add_note(f"'{output}' {content if writer.n_steps else 'contains no complete step'}")
     if summary_path:  # replaces the summary of an earlier run
-        write_json(
-            summary_path, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps}
-        )
+        reason = str(error) or "interrupted from the keyboard"
+        write_json(summary_path, {"failed": reason, "complete_steps": writer.n_steps})
 
 
 def _check_same_case(case: Any, earlier_steps: Sequence[Any], output: Path) -> None:

@@ -15,7 +15,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.flat_pieces import flat_pieces
-from fastcontact.mesh.mesh import Mesh, node_at
+from fastcontact.mesh.mesh import Mesh, node_at, vector_text
 from fastcontact.mesh.topology import bodies, cells_of_outer_facets, outer_facets
 
 # Distances relative to the size of a facet [-]. A node lies on a facet if it is closer to it than NEAR, and it
@@ -46,10 +46,10 @@ def hanging_nodes_text(mesh: Mesh, node: Indices, facet: Indices, outer: OuterFa
     """Return a warning about hanging nodes (m,) on the `outer` facets (m,), or an empty string if there are none."""
     if not len(node):
         return ""
-    centre = ", ".join(f"{x:.6g}" for x in mesh.points[outer.corners[facet[0]]].mean(axis=0))
+    centre = vector_text(mesh.points[outer.corners[facet[0]]].mean(axis=0))
     return (
         f"{len(np.unique(node))} nodes lie on facets of their own body that they do not belong to (first: "
-        f"{node_at(mesh, node[0])}, on the facet around ({centre})): the body is torn there. Let cells share whole facets, "
+        f"{node_at(mesh, node[0])}, on the facet around {centre}): the body is torn there. Let cells share whole facets, "
         "or leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact"
     )
 

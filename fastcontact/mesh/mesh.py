@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -343,21 +343,29 @@ class Mesh(NameSuggestions):
         return self.with_groups(cells={name: np.concatenate([self.cell_groups[member] for member in members])})
 
 
+def vector_text(vector: Iterable[float], digits: int = 6) -> str:
+    """Return the components of a vector or position (dim,) in parentheses, for messages."""
+    return f"({', '.join(f'{x:.{digits}g}' for x in vector)})"
+
+
 def node_at(mesh: Mesh, node: int) -> str:
     """Return the number and the position of a node for messages."""
-    return f"point {node} at ({', '.join(f'{x:.6g}' for x in mesh.points[node])})"
+    return f"point {node} at {vector_text(mesh.points[node])}"
 
 
-def facets_of_cells(mesh: Mesh) -> Iterator[tuple[str, AnyArray, AnyArray]]:
-    """Yield the element type and the nodes (n_cells, n_nodes) of facets of solid cells, and the numbers of the cells.
+def facets_of_cells(mesh: Mesh) -> dict[str, tuple[AnyArray, AnyArray]]:
+    """Return the nodes (n, n_nodes) of the facets of all solid cells and the numbers (n,) of the cells, by facet type.
 
-    Each item contains the facets that have the same local number in all cells of an element type. Their normals point
-    out of the cells.
+    The normals of the facets point out of the cells.
     """
+    facets: dict[str, list[AnyArray]] = {}
+    owners: dict[str, list[AnyArray]] = {}
     for name, block in mesh.solids.items():
         element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)
         for facet, kind in zip(element.facets, element.facet_elements, strict=True):
-            yield kind, block[:, list(facet)], numbers
+            facets.setdefault(kind, []).append(block[:, list(facet)])
+            owners.setdefault(kind, []).append(numbers)
+    return {kind: (np.concatenate(facets[kind]), np.concatenate(owners[kind])) for kind in facets}
 
 
 def _facets_with_nodes(mesh: Mesh, selected: Mask, between: bool, in_group: Mask) -> dict[str, AnyArray]:
@@ -375,17 +383,14 @@ def _facets_with_nodes(mesh: Mesh, selected: Mask, between: bool, in_group: Mask
     in_group : ndarray of bool (n_cells,)
         Whether the facets of each cell may be returned.
     """
-    candidates: dict[str, list[tuple[AnyArray, Mask]]] = {}
-    for kind, nodes, cells in facets_of_cells(mesh):
-        rows = selected[nodes].all(axis=1)
-        candidates.setdefault(kind, []).append((nodes[rows], in_group[cells[rows]]))
     facets_by_kind, n_cells = {}, 2 if between else 1
-    for kind, blocks in candidates.items():
-        facets, flags = map(np.concatenate, zip(*blocks, strict=True))
+    for kind, (nodes, cells) in facets_of_cells(mesh).items():
+        is_candidate = selected[nodes].all(axis=1)
+        facets = nodes[is_candidate]
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
         )
-        count_in_group = np.bincount(group.ravel(), flags, len(count))
+        count_in_group = np.bincount(group.ravel(), in_group[cells[is_candidate]], len(count))
         rows = np.sort(first[(count == n_cells) & (count_in_group == n_cells)])
         if len(rows):
             facets_by_kind[kind] = facets[rows]

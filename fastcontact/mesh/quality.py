@@ -11,7 +11,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.hanging_nodes import hanging_nodes, hanging_nodes_text
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, vector_text
 from fastcontact.mesh.topology import equal_rows
 from fastcontact.round_off import ROUND_OFF
 
@@ -186,9 +186,9 @@ def _check_duplicates(mesh: Mesh, name: str) -> None:
 
 def _cell_text(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
     """Return the number, the element type, the position and, if given, the `measure` of a cell, as part of a message."""
-    centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
+    centre = vector_text(_corners(mesh, name)[row].mean(axis=0))
     size = "" if measure is None else f", {'area' if mesh.dim == 2 else 'volume'} {measure:.3g}"
-    return f"cell {mesh.offsets[name] + row} ({name} at ({centre}){size})"
+    return f"cell {mesh.offsets[name] + row} ({name} at {centre}{size})"
 
 
 def _corners(mesh: Mesh, name: str) -> Array:

@@ -23,7 +23,8 @@ from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import FastcontactError, MeshError
 from fastcontact.mesh import elements, quadrature
-from fastcontact.mesh.mesh import Mesh, facets_of_cells
+from fastcontact.mesh.flat_pieces import flat_pieces
+from fastcontact.mesh.mesh import Mesh, facets_of_cells, vector_text
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
@@ -67,16 +68,16 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
 def _check_folds(mesh: Mesh) -> None:
     """Raise MeshError if two oriented solid cells have a common facet with the same orientation."""
     facet_keys, owners = [], []
-    for kind, nodes, numbers in facets_of_cells(mesh):
+    for kind, (nodes, numbers) in facets_of_cells(mesh).items():
         facet_keys.append(_oriented_keys(nodes[:, : elements.get(kind).n_corners].astype(np.int64)))
         owners.append(numbers)
     keys, owner = np.concatenate(facet_keys), np.concatenate(owners)
     first_rows, second_rows = equal_rows(keys)
     if len(first_rows):
         first, second = sorted((int(owner[first_rows[0]]), int(owner[second_rows[0]])))
-        position = ", ".join(f"{x:.6g}" for x in mesh.points[keys[first_rows[0]][:2]].mean(axis=0))
+        position = vector_text(mesh.points[keys[first_rows[0]][:2]].mean(axis=0))
         raise MeshError(
-            f"cells {first} and {second} lie on the same side of the facet between them, near ({position}), one of "
+            f"cells {first} and {second} lie on the same side of the facet between them, near {position}, one of "
             f"{len(first_rows)} such pairs: the mesh is folded there; move its nodes or remesh"
         )
 
@@ -157,12 +158,8 @@ def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
 @cached_by_mesh
 def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Numbers]]:
     """Return `outer_facets`, `cells_joined_by_facets` and `cells_of_outer_facets`."""
-    by_kind: dict[str, list[tuple[Numbers, Numbers]]] = {}
-    for kind, nodes, numbers in facets_of_cells(mesh):
-        by_kind.setdefault(kind, []).append((nodes, numbers))
     outer, cell_numbers, pairs = {}, {}, [np.empty((2, 0), np.int32)]
-    for name, blocks in by_kind.items():
-        facets, owner = map(np.concatenate, zip(*blocks, strict=True))
+    for name, (facets, owner) in facets_of_cells(mesh).items():
         pair_rows = np.stack(equal_rows(np.sort(facets, axis=1)))
         single = np.ones(len(facets), bool)
         single[pair_rows] = False
@@ -274,8 +271,7 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
     blocks = mesh.cells_of(group, dim=1)
     if not blocks:
         raise MeshError(f"group '{group}' contains no line cells, so its nodes have no order along a line")
-    pieces = [block[:, [0, 2, 1]] if block.shape[1] == 3 else block for block in blocks.values()]
-    segments = np.concatenate([np.column_stack([p[:, i], p[:, i + 1]]) for p in pieces for i in range(p.shape[1] - 1)])
+    segments = np.concatenate([b[:, flat_pieces(b.shape[1], dim=2)].reshape(-1, 2) for b in blocks.values()])
     nodes, local = np.unique(segments, return_inverse=True)
     local = local.reshape(segments.shape)
     degree = np.bincount(local.ravel(), minlength=len(nodes))

@@ -20,7 +20,7 @@ from fastcontact.elasticity.loads import LOAD_POINTS, BodyForce, Load, Pressure,
 from fastcontact.heat.loads import Film, Heating
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, vector_text
 from fastcontact.mesh.quality import poorest_cell
 from fastcontact.mesh.topology import bodies, cached_by_mesh, outer_facets
 from fastcontact.model.checks import initial_gaps
@@ -201,12 +201,12 @@ def _close_nodes(model: Model) -> str:
     if count < mesh.dim:  # bodies that touch only at a corner
         return ""
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
-    point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(distance.max())
     predicate = "coincide with" if largest <= LENGTH_ROUND_OFF * size else f"lie within {largest:.3g} of"
     return (
         f"{count} nodes {predicate} another node, and no contact joins them (first: points {first[0]} and {first[1]} at "
-        f"({point})): merge them in the mesher or with generate.transform.merge_points, or define the contact"
+        f"{vector_text(mesh.points[first[0]])}): merge them in the mesher or with generate.transform.merge_points, or "
+        "define the contact"
     )
 
 
@@ -242,9 +242,8 @@ def _penetration(model: Model, pairs: Pairs, prescribed: Array) -> Iterator[str]
             continue  # the penetration is an interference, which loads the bodies
         gap, normal = initial_gaps(bound)
         approach = np.abs(normal) @ motion
-        approach = np.where(
-            approach > SINGLE_PRECISION * motion.max(), approach, SAG * bound.secondary.largest_diameters(bound.points)
-        )
+        sag = SAG * bound.secondary.largest_diameters(bound.points)
+        approach = np.where(approach > SINGLE_PRECISION * motion.max(), approach, sag)
         row = int(np.argmin(gap + approach))
         if -gap[row] > approach[row]:
             point = bound.secondary.points[row]

@@ -130,11 +130,9 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
         check_number(f"the {key} in the {option} of contact '{name}'", value)
         if not value > 0:
             raise ContactError(f"the {key} {value} in the {option} of contact '{name}' must be positive")
-    law = cohesive_law(
-        *(float(constants[key]) for key in required),
-        reversible=option == "adhesion",
-        **{key: value if key in CHOICES else float(value) for key, value in constants.items() if key in optional},
-    )
+    values = {key: value if key in CHOICES else float(value) for key, value in constants.items()}
+    further = {key: value for key, value in values.items() if key in optional}
+    law = cohesive_law(*(values[key] for key in required), reversible=option == "adhesion", **further)
     shear_fractions = np.linspace(0.0, 1.0, 65)
     onset, end = law.limits(np.sqrt(1.0 - shear_fractions), np.sqrt(shear_fractions))
     if not (onset < end).all():

@@ -19,6 +19,7 @@ from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import Candidates, gap_rows, relative_motion
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import rows_of
+from fastcontact.mesh.mesh import vector_text
 from fastcontact.model.contact_pair import ContactPair, angle_at
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -86,12 +87,12 @@ def prescribed_overlap_warnings(pairs: Pairs, supports: Supports) -> list[str]:
 
 def _summary(contact: ContactPair, formulation: Formulation, overlap: Overlap) -> str:
     """Return the first part of a message: the number of nodes, the sides and the largest depth."""
-    position = ", ".join(f"{x:.6g}" for x in formulation.points[overlap.point])
+    position = vector_text(formulation.points[overlap.point])
     preposition = "off" if formulation.options.kind in ALWAYS_CLOSED else "into"
     side = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"
     return (
         f"supports push {overlap.count} of the {overlap.total} nodes of '{contact.secondary}' {preposition} {side}, contact "
-        f"'{contact.name}', by up to {overlap.depth:.4g} (point {overlap.point} at ({position}), instant {overlap.instant:g})"
+        f"'{contact.name}', by up to {overlap.depth:.4g} (point {overlap.point} at {position}, instant {overlap.instant:g})"
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from fastcontact._tools.argument_types import finite_vector
+from fastcontact._tools.argument_types import unit_vector
 from fastcontact._tools.records import record
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, check_number
@@ -185,10 +185,7 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
 def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | None) -> Array:
     """Return the unit vector (dim,) along `normal`, by default the normal of the plane through the nodes."""
     if normal is not None:
-        vector = finite_vector(normal, mesh.dim)
-        if vector is None or not vector.any():
-            raise ModelError(f"the normal {normal} of {name} must be {mesh.dim} numbers, not all zero")
-        return np.asarray(vector / np.linalg.norm(vector))
+        return unit_vector("normal", normal, name, mesh.dim, ModelError)
     arms = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
     extent, axes = np.linalg.svd(arms, full_matrices=True)[1:]
     if len(nodes) < mesh.dim or (len(extent) >= mesh.dim and extent[-1] > SINGLE_PRECISION * extent[0]):

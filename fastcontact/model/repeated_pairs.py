@@ -105,7 +105,6 @@ def _common_smooth_nodes(points: Array, first: Surface, second: Surface) -> Numb
     nodes, *rows = np.intersect1d(first.points, second.points, return_indices=True)
     if not len(nodes):
         return nodes
-    normals = [
-        DeformedSide(side, points).nodal_normals[index] for side, index in zip((first, second), rows, strict=True)
-    ]
+    sides = zip((first, second), rows, strict=True)
+    normals = [DeformedSide(side, points).nodal_normals[index] for side, index in sides]
     return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > np.cos(np.radians(CORNER))])

@@ -13,12 +13,13 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._tools.grouping import grouped
 from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
-from fastcontact.mesh.mesh import Mesh, node_at
+from fastcontact.mesh.mesh import Mesh, node_at, vector_text
 from fastcontact.mesh.topology import RigidParts, bodies, rigid_parts
 from fastcontact.round_off import SINGLE_PRECISION, TINY
 
@@ -118,9 +119,8 @@ class FreeMotions:
         """
         by_body: dict[str, list[str]] = {}
         for column in _column_echelon_form(self.weights).T:
-            rows_of_body: dict[str, list[int]] = {}
-            for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()).tolist():
-                rows_of_body.setdefault(self.labels[i].body, []).append(i)
+            moving_rows = np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()).tolist()
+            rows_of_body = grouped((self.labels[i].body, i) for i in moving_rows)
             together: dict[tuple[str, bytes], list[str]] = {}  # bodies, or parts of a body that move as one
             for body, rows in rows_of_body.items():
                 motion = np.round(self._at_origin(column, rows), 6) + 0.0  # no negative zeros
@@ -159,9 +159,9 @@ class FreeMotions:
         if len(centre) == 3 and not translation.any() and len(rows) == 1:
             return labels[0].motion
         point = centre + (np.cross(rotation, translation) / square)[: len(centre)]
-        position = _vector_text(np.where(np.abs(point) > 1e-5 * size, point, 0.0))
+        position = vector_text(np.where(np.abs(point) > 1e-5 * size, point, 0.0), 4)
         direction = rotation / rotation[np.argmax(np.abs(rotation))]
-        line = f" along {_vector_text(np.where(np.abs(direction) > 1e-6, direction, 0.0))}"
+        line = f" along {vector_text(np.where(np.abs(direction) > 1e-6, direction, 0.0), 4)}"
         return f"rotation about {position}" if len(centre) == 2 else f"rotation about the line through {position}{line}"
 
 
@@ -200,11 +200,6 @@ def _column_echelon_form(A: Array) -> Array:
     return A
 
 
-def _vector_text(values: Array) -> str:
-    """Return the components of a vector in parentheses, with four digits."""
-    return f"({', '.join(f'{value:.4g}' for value in values)})"
-
-
 def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
     """Return the name of body `number` for messages, from the `body` (n_points,) of each point.
 
@@ -217,7 +212,7 @@ def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
     if size == len(members):
         return group
     centre = mesh.points[members].mean(axis=0)
-    return f"{group}{PART}{_vector_text(centre)}" if group else f"number {number + 1} (around {centre})"
+    return f"{group}{PART}{vector_text(centre, 4)}" if group else f"number {number + 1} (around {centre})"
 
 
 def _group_of(mesh: Mesh, members: Indices) -> tuple[str, int]:

@@ -29,12 +29,8 @@ PIECE = 1 << 20
 
 def pack(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
     """Return a journal, which is appended to the file, with the changes and the checksums of the new data."""
-    body = b"".join(
-        [
-            *(HEADER.pack(offset, len(data), True) + hashlib.sha256(data).digest() for offset, data in new),
-            *(HEADER.pack(offset, len(data), False) + data for offset, data in changes),
-        ]
-    )
+    checksums = [HEADER.pack(offset, len(data), True) + hashlib.sha256(data).digest() for offset, data in new]
+    body = b"".join([*checksums, *(HEADER.pack(offset, len(data), False) + data for offset, data in changes)])
     return body + FOOTER.pack(len(body), hashlib.sha256(body).digest(), MAGIC)
 
 

@@ -194,11 +194,10 @@ def solid_cells(mesh: Mesh) -> SolidCells:
     counts = [len(block) for block in blocks.values()]
     sizes = np.repeat([block.shape[1] for block in blocks.values()], counts)
     nodes = [block.ravel() for block in blocks.values()]
-    return SolidCells(
-        connectivity=np.concatenate([np.empty(0, np.int64), *nodes], dtype=np.int64),
-        offsets=np.concatenate([[0], np.cumsum(sizes)], dtype=np.int64, casting="unsafe"),
-        types=np.repeat(np.array([elements.get(name).vtk for name in blocks], np.uint8), counts),
-    )
+    connectivity = np.concatenate([np.empty(0, np.int64), *nodes], dtype=np.int64)
+    offsets = np.concatenate([[0], np.cumsum(sizes)], dtype=np.int64, casting="unsafe")
+    types = np.repeat(np.array([elements.get(name).vtk for name in blocks], np.uint8), counts)
+    return SolidCells(connectivity, offsets, types)
 
 
 def xdmf_topology(mesh: Mesh) -> Numbers | None:
@@ -329,16 +328,13 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
 
 def check_contact(caption: str, contact: ContactResult, mesh: Mesh) -> None:
     """Raise FileError if arrays of a pair are inconsistent or do not fit the mesh; the message begins with `caption`."""
-    row = contact_row(mesh.dim, optional_columns(contact))
-    for name in row.names or ():
-        actual_shape, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
+    row, row_of_primary = contact_row(mesh.dim, optional_columns(contact)), primary_row(mesh.dim)
+    columns = [(name, len(contact.points), row[name]) for name in row.names or ()]
+    columns.append(("primary_force_vectors", len(contact.primary_points), row_of_primary["force_vectors"]))
+    for name, n_points, kind in columns:
+        actual_shape, shape = np.shape(getattr(contact, name)), (n_points, *kind.shape)
         if actual_shape != shape:
             raise FileError(f"{caption}: {name} has shape {actual_shape}, but {shape} is needed")
-    if np.shape(contact.primary_force_vectors) != (len(contact.primary_points), mesh.dim):
-        raise FileError(
-            f"{caption}: primary_force_vectors has shape {np.shape(contact.primary_force_vectors)}, but "
-            f"{(len(contact.primary_points), mesh.dim)} is needed"
-        )
     points = np.concatenate([contact.points, contact.primary_points])
     outside = points[(points < 0) | (points >= mesh.n_points)]
     if len(outside):

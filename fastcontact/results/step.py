@@ -589,10 +589,8 @@ class StepResult(NameSuggestions):
         return shown | {label: str(self.iterations[key]) for key, label in labels.items() if key in self.iterations}
 
     def __repr__(self) -> str:
-        pairs = [
-            f"'{c.name}': force {c.shown['force']}, largest pressure {c.shown['largest pressure']}"
-            for c in self.contact.values()
-        ]
+        shown = [(contact.name, contact.shown) for contact in self.contact.values()]
+        pairs = [f"'{name}': force {s['force']}, largest pressure {s['largest pressure']}" for name, s in shown]
         texts = [f"largest displacement {self.shown['largest displacement']}", *pairs]
         return f"StepResult({self.index}, {self.instant}; {'; '.join(texts)})"
 

@@ -105,10 +105,9 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
         return Limit(float(value[-1]), ROUND_OFF * float(np.abs(value).max()), np.nan, np.nan, len(value), True)
     x = size / np.exp(np.log(size).mean())
     floor = (ROUND_OFF * np.abs(value).max() / scale) ** 2
-    centre, width, evidence = np.concatenate(
-        [_limit_distributions(x, (value - value[-1]) / scale, floor, coarse) for coarse in range(len(value) - 2)],
-        axis=1,
-    )
+    y = (value - value[-1]) / scale
+    distributions = [_limit_distributions(x, y, floor, coarse) for coarse in range(len(value) - 2)]
+    centre, width, evidence = np.concatenate(distributions, axis=1)
     weight = np.exp(evidence - evidence.max())
     weight /= weight.sum()
     low, middle, high = _quantiles(centre, width, weight, len(value) - 2 + PRIOR_WEIGHT)

@@ -96,11 +96,8 @@ def quantities_of_contacts(last: StepResult) -> dict[str, float]:
 
 def _pressure_quantities(contact: ContactResult, share: float = 1.0) -> dict[str, float]:
     """Return the quantities of a contact pair that depend only on the case's fraction `share` of the contact [-]."""
-    quantities = {
-        "force": contact.normal_force if contact.cancels else contact.force_against_theory(share),
-        "pressure_max": contact.pressure_max,
-        "contact_radius": contact_radius(contact),
-    }
+    force = contact.normal_force if contact.cancels else contact.force_against_theory(share)
+    quantities = {"force": force, "pressure_max": contact.pressure_max, "contact_radius": contact_radius(contact)}
     at_middle = np.abs(contact.place) <= 1e-9 * np.ptp(contact.coordinates, axis=0).max()
     if at_middle.any():
         quantities["pressure_pole"] = float(contact.pressure[at_middle][0])
@@ -325,11 +322,8 @@ def comparison_values(case: Case | None, pair: str | None, force: float) -> dict
     theory: Any = theories.get("theory")
     share = theories.get("share", 1.0)
     at_force = theory.at_force(force / share) if force > 0 and hasattr(theory, "at_force") else None
-    return {
-        "theory": theory_quantities(theory, share),
-        "reference": theory_quantities(theories.get("mesh_converged"), share),
-        "equal_force": theory_quantities(at_force, share),
-    }
+    compared = {"theory": theory, "reference": theories.get("mesh_converged"), "equal_force": at_force}
+    return {name: theory_quantities(solution, share) for name, solution in compared.items()}
 
 
 def title(quantity: str) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from fastcontact._tools.grouping import grouped
 from fastcontact._tools.html_table import html_table
 from fastcontact._tools.versions import versions
 from fastcontact.arrays import AnyArray
@@ -277,11 +278,8 @@ class Report:
         If not all runs issued the warning, the line contains the labels of those that did, or the first three labels and the
         number of the others.
         """
-        issued_by, runs = dict[str, list[str]](), list(runs)
-        for label, texts in runs:
-            for text in dict.fromkeys(texts):
-                issued_by.setdefault(text, []).append(label)
-        lines = []
+        runs, lines = list(runs), []
+        issued_by = grouped((text, label) for label, texts in runs for text in dict.fromkeys(texts))
         for text, labels in sorted(issued_by.items()):
             listed = labels if len(labels) <= 3 else [*labels[:3], f"{len(labels) - 3} more"]
             lines.append(f"warning: {text}" if len(labels) == len(runs) else f"warning ({'; '.join(listed)}): {text}")

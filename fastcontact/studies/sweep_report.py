@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.grouping import grouped
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import BOLT_FORCE, LABELS, column, title
@@ -86,9 +87,8 @@ class Drawing:
         numbers = [float(v) for v in values if not isinstance(v, (str, bool))]
         wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= MIN_LOGARITHMIC_RATIO * min(numbers)
         self.scale = "plain log" if wide else "linear"
-        self.points_of: dict[str, list[Point]] = {}  # points of each curve, by its label
-        for point in sweep.points:
-            self.points_of.setdefault(label_of(point.parameters, self.curve_parameters), []).append(point)
+        # Points of each curve, by its label.
+        self.points_of = grouped((label_of(point.parameters, self.curve_parameters), point) for point in sweep.points)
 
     def draw_values(self, ax: Any, quantity: str) -> None:
         """Draw a quantity and its theory against the parameter.
@@ -270,10 +270,9 @@ class Sweep(Report):
         """
         found = {}
         for name in self.parameters:
-            groups: dict[str, list[Point]] = {}  # points that differ in this parameter only
-            for point in self.points:
-                others = [other for other in self.parameters if other != name]
-                groups.setdefault(label_of(point.parameters, others), []).append(point)
+            others = [other for other in self.parameters if other != name]
+            # Points that differ in this parameter only.
+            groups = grouped((label_of(point.parameters, others), point) for point in self.points)
             several = [points for points in groups.values() if len(points) > 1]
             theories = [{point.theory.get(quantity) for point in points} for points in several]
             if several and all(len(exact) == 1 and None not in exact for exact in theories):

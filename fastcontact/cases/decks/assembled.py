@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.grouping import grouped
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import LONGEST_QUOTED, Location, Row, key_of, look_up
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Surface, SurfaceEntry
@@ -293,10 +294,7 @@ class Assembly:
     @cached_property
     def solids_by_type(self) -> dict[str, list[Element]]:
         """The solids by type of mesh element, each at index `row`."""
-        elements: dict[str, list[Element]] = {}
-        for element in self.solids:
-            elements.setdefault(element.type.element, []).append(element)
-        return elements
+        return grouped((element.type.element, element) for element in self.solids)
 
     @cached_property
     def solid_mesh(self) -> Mesh:
@@ -308,20 +306,17 @@ class Assembly:
     def outer_faces(self) -> dict[Element, list[Face]]:
         """The faces of each solid that no other solid shares."""
         solids = list(itertools.chain.from_iterable(self.solids_by_type.values()))
-        cells, faces = topology.cells_of_outer_facets(self.solid_mesh), {}  # type: Any, dict[Element, list[Face]]
-        for name, facets in topology.outer_facets(self.solid_mesh).items():
-            for cell, points in zip(cells[name].tolist(), facets.tolist(), strict=True):
-                faces.setdefault(solids[cell], []).append(Face(name, tuple(points), solids[cell]))
-        return faces
+        cells = topology.cells_of_outer_facets(self.solid_mesh)
+        return grouped(
+            (solids[cell], Face(name, tuple(points), solids[cell]))
+            for name, facets in topology.outer_facets(self.solid_mesh).items()
+            for cell, points in zip(cells[name].tolist(), facets.tolist(), strict=True)
+        )
 
     @cached_property
     def outer_faces_at(self) -> dict[int, list[Face]]:
         """The outer faces at each point."""
-        by_point: dict[int, list[Face]] = {}
-        for face in itertools.chain.from_iterable(self.outer_faces.values()):
-            for point in face.points:
-                by_point.setdefault(point, []).append(face)
-        return by_point
+        return grouped((point, face) for faces in self.outer_faces.values() for face in faces for point in face.points)
 
     def faces_touching(self, points: set[int]) -> list[Face]:
         """Return the outer faces with a point in `points`."""

@@ -21,10 +21,12 @@ from fastcontact.cases.decks.histories import Period, ShapeGroups
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
 from fastcontact.cases.decks.steps import MOST_INCREMENTS
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.integration import all_nodes_carry_pressure
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic
+from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 from fastcontact.model.relation_rows import rows_along
@@ -334,9 +336,6 @@ def nodal_gaps(model: Model, secondary: str, primary: str, excluded: Sequence[in
 
     Nodes in `excluded` are left out. If no node remains, the result is a gap of zero at the first point.
     """
-    from fastcontact.contact.configuration import Configuration
-    from fastcontact.model.contact_pair import ContactPair
-
     pair = ContactPair("gaps", secondary, primary, "continuous", {})
     formulation, points = model.bind(pair), model.mesh.points
     gaps, _ = formulation.nodal_gap(Configuration.undeformed(points))

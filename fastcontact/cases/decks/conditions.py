@@ -71,11 +71,8 @@ class Conditions:
             **dict.fromkeys(("DLOAD", "DSLOAD"), self.loads), **dict.fromkeys(("DFLUX", "DSFLUX"), self.fluxes),
             **dict.fromkeys(("FILM", "SFILM"), self.films),
         }  # fmt: skip
-        self.histories: tuple[Histories[Any], ...] = (
-            self.supports,
-            self.fixed_temperatures,
-            *dict.fromkeys(self.by_keyword.values()),
-        )
+        loads = dict.fromkeys(self.by_keyword.values())
+        self.histories: tuple[Histories[Any], ...] = (self.supports, self.fixed_temperatures, *loads)
         self.directions = local_directions(assembly)
         if assembly.dim == 3:  # rotations refer to the local axes of their node
             rotations, rotated = assembly.rotations, self.directions

@@ -11,6 +11,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from fastcontact._tools.grouping import grouped
 from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.blocks import Block, Location, key_of
 from fastcontact.cases.decks.content import Amplitude, Content, Step
@@ -230,19 +231,13 @@ class Histories(Generic[Key]):
 
     def distinct_tables(self) -> Iterator[tuple[Table, list[Key]]]:
         """Yield each distinct history with the keys that share it."""
-        members: dict[bytes, list[Key]] = {}
-        for key, track in self.tracks.items():
-            members.setdefault(track.numbers.tobytes(), []).append(key)
-        for keys in members.values():
+        for keys in grouped((track.numbers.tobytes(), key) for key, track in self.tracks.items()).values():
             yield self.table(keys[0]), keys
 
     def tables_by_period(self) -> Iterator[tuple[Table, Period, list[Key]]]:
         """Yield each distinct history with each period in which it acts, and the keys that share both."""
         for table, keys in self.distinct_tables():
-            members: dict[Period, list[Key]] = {}
-            for key in keys:
-                for period in self.tracks[key].periods:
-                    members.setdefault(period, []).append(key)
+            members = grouped((period, key) for key in keys for period in self.tracks[key].periods)
             yield from ((table, period, group) for period, group in members.items() if period.begins < period.ends)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.grouping import grouped
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Element, Face, Target
 from fastcontact.cases.decks.blocks import key_of
@@ -75,10 +76,8 @@ def _cells_of(deck_mesh: DeckMesh, load: Target) -> Iterable[tuple[str, float, l
     """Return the facets or solids on which a load acts, as type, factor of the load and rows of the type."""
     if load.face is not None:
         return [(cell, 1.0, rows) for cell, rows in deck_mesh.facet_rows([load.face]).items()]
-    by_density: dict[tuple[str, float], list[int]] = {}
-    for element in load.elements:
-        if element.type is not None:
-            by_density.setdefault((element.type.element, _density(deck_mesh, element, load)), []).append(element.row)
+    solids = [element for element in load.elements if element.type is not None]
+    by_density = grouped(((e.type.element, _density(deck_mesh, e, load)), e.row) for e in solids)
     return [(cell, density, rows) for (cell, density), rows in by_density.items()]
 
 

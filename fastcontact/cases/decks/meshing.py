@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fastcontact._tools.grouping import grouped
 from fastcontact.arrays import Indices
 from fastcontact.cases.decks.assembled import Assembly, Element, Face, qualified
 from fastcontact.cases.decks.blocks import Location, key_of
@@ -64,10 +65,7 @@ class DeckMesh(Assembly):
 
     def add_solids(self, group: str, solids: Iterable[Element]) -> str:
         """Make a group of the solids among some elements, and return its name."""
-        rows = self.groups[group] = {}
-        for element in solids:
-            if element.type is not None:
-                rows.setdefault(element.type.element, []).append(element.row)
+        self.groups[group] = grouped((e.type.element, e.row) for e in solids if e.type is not None)
         return group
 
     def add_points(self, group: str, points: Iterable[int]) -> str:

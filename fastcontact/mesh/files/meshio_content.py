@@ -8,6 +8,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from fastcontact._tools.grouping import grouped
 from fastcontact._tools.records import field, record
 from fastcontact.arrays import AnyArray, Indices
 from fastcontact.errors import MeshError, warn
@@ -176,9 +177,7 @@ def check_kinds(unknown: Mapping[str, int], known_kinds: Iterable[str]) -> None:
 
 def merge_blocks(blocks: Iterable[Block]) -> list[Block]:
     """Return one block for each kind, in the order in which the kinds first appear."""
-    by_kind: dict[str, list[Block]] = {}
-    for block in blocks:
-        by_kind.setdefault(block.kind, []).append(block)
+    by_kind = grouped((block.kind, block) for block in blocks)
     return [Block(kind, np.concatenate([b.nodes for b in same]), _renumbered(same)) for kind, same in by_kind.items()]
 
 
@@ -193,11 +192,9 @@ def without_duplicates(block: Block) -> Block:
 
 def _renumbered(blocks: list[Block]) -> Groups:
     """Return the members of all groups as numbers of cells in the sequence of the blocks."""
-    groups: dict[str, list[Indices]] = {}
-    for block, start in zip(blocks, np.cumsum([0, *(len(block.nodes) for block in blocks)]), strict=False):
-        for name, rows in block.groups.items():
-            groups.setdefault(name, []).append(np.asarray(rows, np.intp) + start)
-    return {name: np.concatenate(arrays) for name, arrays in groups.items()}
+    starts = np.cumsum([0, *(len(block.nodes) for block in blocks)])
+    groups = [(name, rows + start) for block, start in zip(blocks, starts) for name, rows in block.groups.items()]
+    return {name: np.concatenate(arrays) for name, arrays in grouped(groups).items()}
 
 
 def _add_vertices(point_groups: Groups, block: Block, cell_blocks: list[Block]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -108,11 +108,8 @@ def mesh_on_lines(element: str, lines: Sequence[Array], name: str = "BLOCK") -> 
     name : str
         Name of the group of all solid cells.
     """
-    divisions = [len(line) - 1 for line in lines]
-    if len(lines) == 2:
-        lattice = rectangle((divisions[0], divisions[1]), (divisions[0], divisions[1]), element, name=name)
-    else:
-        n, m, k = divisions
-        lattice = box((n, m, k), (n, m, k), element, name=name)
+    make: Callable[..., Mesh] = rectangle if len(lines) == 2 else box
+    divisions = tuple(len(line) - 1 for line in lines)
+    lattice = make(divisions, divisions, element, name=name)
     points = [np.interp(x, np.arange(len(line)), line) for x, line in zip(lattice.points.T, lines, strict=True)]
     return lattice.replace(points=np.column_stack(points))

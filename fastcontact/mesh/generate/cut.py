@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fastcontact._tools.argument_types import typed
+from fastcontact._tools.argument_types import typed, unit_vector
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
@@ -66,10 +66,8 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
         block = mesh.cells[name]
         is_new = beyond_cut[start : start + len(block), None] & (new_node[block] >= 0)
         cells[name] = np.where(is_new, new_node[block], block)
-    point_groups = {
-        name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
-        for name, members in mesh.point_groups.items()
-    }
+    on_cut = {name: members[new_node[members] >= 0] for name, members in mesh.point_groups.items()}
+    point_groups = {name: np.append(members, new_node[on_cut[name]]) for name, members in mesh.point_groups.items()}
     positions = np.concatenate([mesh.points, mesh.points[points]])
     cut_mesh = mesh.replace(points=positions, cells=cells, point_groups=point_groups)
     return cut_mesh.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
@@ -77,15 +75,11 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
 
 def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] | None) -> Array:
     """Return the unit normal (dim,) of a section, by default that of the plane fitted to its points."""
-    if normal is None:
-        positions = mesh.points[points] - mesh.points[points].mean(axis=0)
-        fitted = np.linalg.svd(positions, full_matrices=True)[2][-1]
-        return np.asarray(fitted * np.sign(fitted[np.argmax(np.abs(fitted))]))
-    vector = np.asarray(normal, float)
-    length = np.linalg.norm(vector)
-    if vector.shape != (mesh.dim,) or not (np.isfinite(length) and length > 0):
-        raise MeshError(f"the normal {normal} of section '{group}' must be {mesh.dim} numbers, not all zero")
-    return np.asarray(vector / length)
+    if normal is not None:
+        return unit_vector("normal", normal, f"section '{group}'", mesh.dim, MeshError)
+    positions = mesh.points[points] - mesh.points[points].mean(axis=0)
+    fitted = np.linalg.svd(positions, full_matrices=True)[2][-1]
+    return np.asarray(fitted * np.sign(fitted[np.argmax(np.abs(fitted))]))
 
 
 class _Sides(NamedTuple):

@@ -154,12 +154,10 @@ class Forest:
         if name == "quad4":
             lattice.append(len(self.points) + np.arange(len(parents))[:, None])
             self.points = np.concatenate([self.points, centres(self.points[parents], self.points[lattice[1]])])
-        points = np.concatenate(lattice, axis=1)
-        children = points[:, RED[name]].reshape(-1, CORNERS[name])
-        self._leaves[name] = _Leaves(
-            np.concatenate([leaves.corners[~mask], children]),
-            np.concatenate([leaves.root[~mask], np.repeat(leaves.root[mask], len(RED[name]))]),
-        )
+        children = np.concatenate(lattice, axis=1)[:, RED[name]].reshape(-1, CORNERS[name])
+        roots = np.repeat(leaves.root[mask], len(RED[name]))
+        corners = np.concatenate([leaves.corners[~mask], children])
+        self._leaves[name] = _Leaves(corners, np.concatenate([leaves.root[~mask], roots]))
 
     def _leaves_to_refine(self, name: str) -> Mask:
         """Return the mask (n,) of leaves that must be divided because there is no green refinement for them.

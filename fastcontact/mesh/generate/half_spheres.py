@@ -270,10 +270,9 @@ def rings(
     c = positive("outer_radius", outer_radius)
     if not a < b < c:
         raise MeshError(f"inner_radius, interface_radius and outer_radius must increase, not {a:g}, {b:g}, {c:g}")
-    return union(
-        _ring(element, (a, b), each(count, "divisions_inner", divisions_inner), "INNER", ("BORE", "CONT_INNER")),
-        _ring(element, (b, c), each(count, "divisions_outer", divisions_outer), "OUTER", ("CONT_OUTER", "RIM")),
-    )
+    inner = _ring(element, (a, b), each(count, "divisions_inner", divisions_inner), "INNER", ("BORE", "CONT_INNER"))
+    outer = _ring(element, (b, c), each(count, "divisions_outer", divisions_outer), "OUTER", ("CONT_OUTER", "RIM"))
+    return union(inner, outer)
 
 
 def _ring(element: str, radii: tuple[float, float], divisions: list[int], name: str, sides: tuple[str, str]) -> Mesh:

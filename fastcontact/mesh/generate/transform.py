@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.grouping import grouped
 from fastcontact._tools.neighbours import close_pairs
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
@@ -168,20 +169,14 @@ def union(*meshes: Mesh) -> Mesh:
     cells = _merge({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in shifted)
     starts = starts_of(cells)
     numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
-    return Mesh(
-        np.concatenate([mesh.points for mesh in meshes]),
-        cells,
-        _merge({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
-        _merge({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in shifted),
-    )
+    cell_groups = ({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers)
+    point_groups = ({name: members + n for name, members in mesh.point_groups.items()} for mesh, n in shifted)
+    return Mesh(np.concatenate([mesh.points for mesh in meshes]), cells, _merge(cell_groups), _merge(point_groups))
 
 
 def _merge(groups_of_meshes: Iterable[Groups]) -> Groups:
     """Return the concatenated arrays of several meshes by name."""
-    by_name: dict[str, list[AnyArray]] = {}
-    for groups in groups_of_meshes:
-        for name, values in groups.items():
-            by_name.setdefault(name, []).append(values)
+    by_name = grouped(entry for groups in groups_of_meshes for entry in groups.items())
     return {name: np.concatenate(arrays) for name, arrays in by_name.items()}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._jit import ahead
-from fastcontact._tools.argument_types import finite_vector, typed
+from fastcontact._tools.argument_types import typed, unit_vector
 from fastcontact._tools.units import named_units
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Rotation
@@ -207,10 +207,7 @@ class ModelBase(NameSuggestions):
             return None
         if not stiffness:
             raise ModelError(f"{name} has a direction, but no axial or transverse stiffness that would use it")
-        vector = finite_vector(direction, self.mesh.dim)
-        if vector is None or not vector.any():
-            raise ModelError(f"the direction {direction} of {name} must be {self.mesh.dim} numbers, not all zero")
-        return np.asarray(vector / np.linalg.norm(vector))
+        return unit_vector("direction", direction, name, self.mesh.dim, ModelError)
 
     def related_points(self) -> Mask:
         """Return the mask (n_points,) of the points on which a multi-point constraint or a spring acts."""

@@ -18,7 +18,7 @@ from fastcontact.model.checks import check_forces
 from fastcontact.model.couplings import Moment, Spread, SpreadForce
 from fastcontact.model.parts.base import Groups, group_names
 from fastcontact.model.parts.heat import ModelHeat
-from fastcontact.model.ramp import History, Table, table_of
+from fastcontact.model.ramp import History, Table, sums_by_ramp, table_of
 
 
 @typed(ModelError)
@@ -301,13 +301,10 @@ class ModelLoads(ModelHeat):
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return the nodal forces (n_points, dim) [force] of all loads at multiplier 1, by history."""
-        related = self.related_points()
-        by_ramp: dict[Table | None, Array] = {}
-        for load in self.loads:
-            forces = self.load_vector(load)
+        related, vectors = self.related_points(), [self.load_vector(load) for load in self.loads]
+        for load, forces in zip(self.loads, vectors, strict=True):
             check_forces(self.mesh, forces, related, load.name)
-            by_ramp[load.ramp] = by_ramp.get(load.ramp, 0.0) + forces
-        return by_ramp
+        return sums_by_ramp((load.ramp, forces) for load, forces in zip(self.loads, vectors, strict=True))
 
     def following_pressures(self) -> list[tuple[FollowerPressure, Table | None]]:
         """Return the pressures, as loads that follow the deformed surface, with their histories."""
