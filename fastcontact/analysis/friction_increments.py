@@ -117,20 +117,25 @@ def _path(step: StepContext, constraints: StackedConstraints, nodes: SharedNodes
     if forces is None:
         return None
     normal, traction = forces
-    state, gaps = step.state, []  # in the configuration at the beginning of the step
+    state, gaps, known = step.state, [], []  # in the configuration at the beginning of the step
     begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
     for name, part in pair_surfaces(step.problem, state, begin, Iterate.of(state)).parts.items():
         current = constraints.parts[name]
-        initial = part if np.array_equal(part.positions, current.positions) else current
+        same = np.array_equal(part.positions, current.positions)
+        initial = part if same else current
         determined = np.isfinite(initial.gap0) & initial.usable
+        known.append(determined & same)
         gaps.append(np.where(determined, initial.gaps(state.u), current.gaps(state.u)))
     gap = np.where(normal != 0.0, 0.0, np.maximum(np.concatenate(gaps), 0.0))
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     slips = _closing(step, constraints, gap)
+    determined = np.concatenate(known)
     if nodes is not None:
+        determined[nodes.redundant] = False
         gap, normal, traction, slips = nodes.of_representatives(constraints, gap, normal, traction, slips)
     waiting = (gap > LENGTH_ROUND_OFF * size) & ~constraints.equality
-    return LoadPath(gap, normal, traction, slips, waiting) if waiting.any() else None
+    geometry = constraints.positions, tuple(constraints.rows.values())
+    return LoadPath(gap, normal, traction, slips, waiting, determined, *geometry) if waiting.any() else None
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:

@@ -21,7 +21,7 @@ The last increment depends on the earlier ones only through their slips, which s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -146,6 +146,12 @@ class LoadPath:
         Tangential relative displacement while the whole gap closes, which is not slip [length].
     waiting : ndarray of bool (m,)
         Constraints that are open at the beginning of the step. They carry no force before they close.
+    known : ndarray of bool (m,)
+        Constraints that face the other side at the beginning of the step.
+    positions : ndarray (m, dim)
+        Reference positions [length].
+    pairs : sequence of slice
+        Constraints of each pair.
     """
 
     gap: Array
@@ -153,6 +159,9 @@ class LoadPath:
     traction: Array
     closing: Array
     waiting: Mask
+    known: Mask
+    positions: Array
+    pairs: Sequence[slice]
 
     def along(self, directions: tuple[Array, ...], rows: Indices) -> tuple[Array, Array]:
         """Return the data of the constraints `rows` (q,), with components along each of k tangents (m, dim).
@@ -167,6 +176,39 @@ class LoadPath:
         forces = np.vstack([self.normal, _components(self.traction, directions)])
         return forces[:, rows], np.vstack([self.gap, _components(self.closing, directions)])[:, rows]
 
+    def missing_slip(self, rows: Indices, free: Array, slip: Array, begin: float, end: float) -> Array:
+        """Return the slips (k, q) of constraints `rows` (q,) that an increment of a moving contact lacks [length].
+
+        If a contact moves over a surface while it closes, the smallest gap decreases linearly, but not the gap of any
+        constraint, since the contact moves towards it on a curved surface. An increment therefore lasts as long as the
+        smallest gap takes to decrease by as much as the smallest gap in the increment does.
+
+        Parameters
+        ----------
+        rows : ndarray of int (q,)
+        free : ndarray (1 + k, q)
+            Gaps and slips at the end of the step without contact forces [length].
+        slip : ndarray (k, q)
+            Slips in the increment. Nothing is added where friction takes more than half of the slip without forces, since
+            the slip then depends on forces and not on motions [length].
+        begin, end : float
+            Fractions of the step at which the increment begins and ends.
+        """
+        missing, travel = np.zeros_like(slip), np.linalg.norm(free[1:], axis=0)
+        for pair in self.pairs:
+            members = np.flatnonzero((pair.start <= rows) & (rows < pair.stop) & np.isfinite(free[0]))
+            if self.normal[pair].any() or not (free[0, members] < 0.0).any():
+                continue
+            deepest = members[np.argmin(free[0, members])]
+            distance = np.linalg.norm(self.positions[pair] - self.positions[rows[deepest]], axis=1)
+            passed = distance <= travel[deepest]
+            first = float(self.gap[pair][(passed & self.known[pair]) | (distance == 0.0)].min())
+            near = members[passed[rows[members] - pair.start]]  # a contact elsewhere closes at another time
+            gaps = [((1.0 - p) * self.gap[rows[near]] + p * free[0, near]).min() for p in (begin, end)]
+            duration = max(gaps[0] - gaps[1], 0.0) / (first - free[0, deepest])
+            missing[:, members] = (duration - (end - begin)) * free[1:, members]
+        return np.where((slip * free[1:]).sum(axis=0) > 0.5 * (end - begin) * travel**2, missing, 0.0)
+
 
 @record
 class LastIncrement:
@@ -180,6 +222,8 @@ class LastIncrement:
         Part of `slip` before the constraint closed in this step, zero if it was closed at the beginning [length].
     traction : ndarray (m, dim)
         Tangential force vectors [force].
+    missing_slip : ndarray (m, dim)
+        Slip vectors of `LoadPath.missing_slip` in the last increment [length].
     work : ndarray (m,)
         See `Solution.work`, of the increments before the last one [energy].
     normal : ndarray (m,)
@@ -189,6 +233,7 @@ class LastIncrement:
     slip: Array
     slip_before_closing: Array
     traction: Array
+    missing_slip: Array
     work: Array
     normal: Array
 
@@ -200,10 +245,11 @@ class LastIncrement:
         """Return the solution with the slips and the work of the step, given the solution of its last increment."""
         before = np.vstack([self.normal, _components(self.traction, solution.directions)])
         after = np.vstack([solution.multiplier, solution.tangential.T])
+        missing = _components(self.missing_slip, solution.directions)
         return replace(
             solution,
             slip=solution.slip + _components(self.slip, solution.directions).T,
-            work=self.work + _frictional_work(before, after, solution.slip.T),
+            work=self.work + _frictional_work(before, after, solution.slip.T + missing),
             slip_before_closing=_components(self.slip_before_closing, solution.directions).T,
         )
 
@@ -295,7 +341,7 @@ class Solution:
 
 
 def in_increments(
-    initial_offset: Array, closing: Array, y: Array, waiting: Mask, solve: IncrementSolver
+    initial_offset: Array, closing: Array, y: Array, path: LoadPath, rows: Indices, solve: IncrementSolver
 ) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array]]:
     """Return the forces at the end of a load step that is solved in increments, which end where constraints close.
 
@@ -307,8 +353,9 @@ def in_increments(
         Gaps at the beginning of the step, and the slips that closing them would add, see `LoadPath.along` [length].
     y : ndarray (1 + k, m)
         Normal and tangential forces at the beginning of the step [force].
-    waiting : ndarray of bool (m,)
-        Constraints that are open at the beginning of the step.
+    path : LoadPath
+    rows : ndarray of int (m,)
+        Numbers of these m constraints in `path`.
     solve : IncrementSolver
 
     Returns
@@ -318,12 +365,13 @@ def in_increments(
     gaps : ndarray (1 + k, m)
         Gaps at the end of the step, and the slips of the whole step [length].
     before : tuple
-        Data of `LastIncrement`: the components (3, k, m) of its three vectors along the tangents, and its attributes
+        Data of `LastIncrement`: the components (4, k, m) of its four vectors along the tangents, and its attributes
         `work` and `normal`.
     """
     closed, slip, iterations, settled = y[0] > 0.0, np.zeros_like(initial_offset[1:]), 0, True
     work = np.zeros(initial_offset.shape[1])
     gap = last_gap = closing[0]
+    waiting, free = path.waiting[rows], np.vstack([gap - initial_offset[0], -initial_offset[1:]])
     slip_before_closing = np.zeros_like(slip)
     closing_slips = np.where(gap > 0.0, closing[1:], 0.0)
     initial_offset = initial_offset + np.vstack([np.zeros_like(gap), closing_slips])
@@ -354,8 +402,9 @@ def in_increments(
             waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
-        before = np.stack([slip, slip_before_closing, y[1:]]), work, y[0]
-        work = work + _frictional_work(y, forces.y, forces.gaps[1:])
+        missing_slip = path.missing_slip(rows, free, forces.gaps[1:], begin, end)
+        before = np.stack([slip, slip_before_closing, y[1:], missing_slip]), work, y[0]
+        work = work + _frictional_work(y, forces.y, forces.gaps[1:] + missing_slip)
         total_slip = slip + forces.gaps[1:]
         slip = slip_after(forces.gaps[1:], forces.gaps[0])
         begin, y, closed, last_gap = end, forces.y, forces.closed, forces.gaps[0]

@@ -121,7 +121,7 @@ def _eliminated(
             initial_offset[0] += path.gap
             initial_offset = np.where(usable, initial_offset, 0.0)
             distance = 4.0 * largest(initial_offset[0])  # further than constraints can close
-            result, gaps, before = in_increments(initial_offset, closing, y, path.waiting, increment)
+            result, gaps, before = in_increments(initial_offset, closing, y, path, all_rows, increment)
             result, last_increment = replace(result, gaps=gaps), _last_increment(before, None, all_rows, constraints)
     except ConvergenceError:
         return None
@@ -154,7 +154,7 @@ def _with_included(
         gaps_of_included = result.gaps
     else:
         y0, closing = (rotated(problem.Q, values) for values in path.along(constraints.directions, rows))
-        result, gaps_of_included, before = problem.in_increments(y0, closing, path.waiting[rows])
+        result, gaps_of_included, before = problem.in_increments(y0, closing, path, rows)
         last_increment = _last_increment(before, problem.Q, rows, constraints)
     y = rotated(problem.Q, result.y, back=True)
     u = loaded.involved_solution(R.T @ y.ravel()[components], u)
@@ -208,7 +208,7 @@ class _IncludedProblem:
         return scattered(self.F @ y.ravel()[self.components], self.components, y.shape)
 
     def in_increments(
-        self, y0: Array, closing: Array, waiting: Mask
+        self, y0: Array, closing: Array, path: LoadPath, rows: Indices
     ) -> tuple[FrictionSolution, Array, tuple[Array, Array, Array]]:
         """Return the solution along the load path, see `solution.in_increments`.
 
@@ -217,7 +217,7 @@ class _IncludedProblem:
         y0[1:][self.held_slips], closing[1:][self.held_slips] = 0.0, 0.0
         initial_offset = -self.free - self._gap_changes(y0)
         initial_offset[0] += closing[0]
-        return in_increments(initial_offset, closing, y0, waiting, self._increment)
+        return in_increments(initial_offset, closing, y0, path, rows, self._increment)
 
     def _increment(self, offset: Array, carrying: Mask, closed: Mask, start: Array | None) -> FrictionSolution:
         """See `solution.IncrementSolver`."""
@@ -301,8 +301,8 @@ def _last_increment(
     no_gaps = np.zeros((1, len(rows)))
     along_tangents = np.stack([rotated(Q, np.vstack([no_gaps, along]), back=True)[1:] for along in components])
     m, dim = constraints.positions.shape
-    vectors, all_work, all_normal = np.zeros((3, m, dim)), np.zeros(m), np.zeros(m)
+    vectors, all_work, all_normal = np.zeros((4, m, dim)), np.zeros(m), np.zeros(m)
     vectors[:, rows] = np.einsum("pkm,kmd->pmd", along_tangents, np.stack(constraints.directions)[:, rows])
     all_work[rows], all_normal[rows] = work, normal
-    slip, slip_before_closing, traction = vectors
-    return LastIncrement(slip, slip_before_closing, traction, all_work, all_normal)
+    slip, slip_before_closing, traction, missing = vectors
+    return LastIncrement(slip, slip_before_closing, traction, missing, all_work, all_normal)
