@@ -237,9 +237,7 @@ def relative_excess(problem: Problem, u: Array, excess: ExcessStiffness) -> floa
     system, n, zero = problem.system, problem.model.n_dofs, np.zeros(len(u))
 
     def excess_force(displacement: Array) -> Array:
-        force = np.zeros(len(u))
-        force[:n] = excess.force(problem.displacement(displacement)).ravel()
-        return force
+        return np.pad(excess.force(problem.displacement(displacement)).ravel(), (0, len(u) - n))
 
     def reference_force(v: Array) -> Array:
         displacement = system.displacement(v, zero)

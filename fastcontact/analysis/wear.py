@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fastcontact.analysis.work import ContactForces
-from fastcontact.arrays import Array, Numbers, largest
+from fastcontact.arrays import Array, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import facet_measure, fine_rule
@@ -148,13 +148,6 @@ def _linear_on_facets(pair: Formulation, values: Array) -> Array:
         shape = element.corner_shape(element.nodes)
         linear[block.local] = means[block.local[:, : shape.shape[1]]] @ shape.T
     return linear
-
-
-def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
-    """Return wear depths (m,) at `points` (m,) as depths of all points (n_points,), zero elsewhere [length]."""
-    depths = np.zeros(n_points)
-    depths[points] = depth
-    return depths
 
 
 def ratio_to_elastic_waves(pair: Formulation, worn: Worn) -> float:

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from fastcontact._tools.records import record, replace
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, mask_at
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.integration import facet_measure, fine_rule
@@ -30,7 +30,7 @@ from fastcontact.contact.projection import (
     facet_points,
 )
 from fastcontact.contact.surface import Surface
-from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of
+from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, without_zeros
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors, weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -258,8 +258,7 @@ def with_fluid_pressure(
     # Where no contact is possible, the first row of each node transmits the force.
     pressure = np.where(wetted, config.fluid_pressure, 0.0)
     uncovered = constraints.nodal_field.uncovered(side, constraints.usable)
-    first_of_node = np.zeros(len(node), bool)
-    first_of_node[np.unique(node, return_index=True)[1]] = True
+    first_of_node = mask_at(np.unique(node, return_index=True)[1], len(node))
     partly_uncovered = np.zeros(len(wetted), bool)
     for block, fraction in zip(side.blocks, uncovered, strict=True):
         partly_uncovered[block.local[fraction > SINGLE_PRECISION]] = True
@@ -321,9 +320,7 @@ def _rows_along_area_vectors(
     weights = csr_array((values, (row[replaced], point[replaced])), shape=(m, n_dofs // dim))
     area_ratio = np.where(rows, -np.einsum("md,md->m", vectors, normal) * transmitted, 1.0)
     other_entries = csr_array((entries.data * area_ratio[row] * ~replaced, (row, entries.col)), shape=B.shape)
-    with_area_vectors = csr_array(other_entries + rows_of(weights, -vectors))
-    with_area_vectors.eliminate_zeros()
-    return with_area_vectors, weights
+    return without_zeros(csr_array(other_entries + rows_of(weights, -vectors))), weights
 
 
 def _transmitted_fraction(x: Array, gap: Array, vectors: Array, opposite: list[Array], facet_size: float) -> Array:

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, scattered
 from fastcontact.elasticity.loads import (
     Load,
     Table,
@@ -140,9 +140,8 @@ class NodalHeat(Heating):
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
         """Return the heat flows (n_points,) [power] at multiplier 1; see `Heating.power`."""
-        total, nodes = np.zeros(mesh.n_points), mesh.points_of(self.group)
-        total[nodes] = evaluated(self.value, mesh.points[nodes], self.name)
-        return total
+        nodes = mesh.points_of(self.group)
+        return scattered(evaluated(self.value, mesh.points[nodes], self.name), nodes, mesh.n_points)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, scattered
 from fastcontact.errors import ContactError, ConvergenceError
 from fastcontact.linear.field_compliance import FieldCompliance
 
@@ -147,9 +147,7 @@ def inverse_entries(n: int, solve: Callable[[Array], Array], rows: Indices, colu
     """Return the entries (m, k) of ``K^-1`` in `rows` (m,) and `columns` (k,); `solve` is called for each column."""
     entries = np.empty((len(rows), len(columns)))
     for k, column in enumerate(columns):
-        unit = np.zeros(n)
-        unit[column] = 1.0
-        entries[:, k] = solve(unit)[rows]
+        entries[:, k] = solve(scattered(1.0, column, n))[rows]
     return entries
 
 

@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike
 from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import AnyArray, Indices
+from fastcontact.arrays import AnyArray, Indices, numbers_at
 from fastcontact.linear.sparse_rows import entry_rows, scaled
 
 # Largest relative difference between two sets of springs, or between the weights of eliminated unknowns, for which the same
@@ -69,10 +69,8 @@ class Springs:
 
         The rows of the result are zero in the columns of the pivots. The springs must not have a matrix `force_rows`.
         """
-        R, W, n = self.rows, weights, self.rows.shape[1]
-        number = np.full(n, -1, np.int32)
-        number[pivots] = np.arange(len(pivots))
-        column = number[R.indices]
+        R, W = self.rows, weights
+        column = numbers_at(pivots, R.shape[1])[R.indices]
         is_pivot = column >= 0
         starts = np.concatenate([[0], np.cumsum(is_pivot)])[R.indptr]
         pivot_columns = csr_array((R.data[is_pivot], column[is_pivot], starts), shape=(R.shape[0], W.shape[0]))

@@ -21,7 +21,6 @@ from fastcontact._tools.records import record, replace
 from fastcontact.analysis.friction import delassus, dense, eliminated
 from fastcontact.analysis.friction.cone_newton import SLIP_COMPLIANCE, Law, aligning_rotation, held_tangents, rotated
 from fastcontact.analysis.friction.delassus import Delassus
-from fastcontact.analysis.friction.dense import numbers_at, scattered
 from fastcontact.analysis.solution import (
     Accuracy,
     FrictionSolution,
@@ -32,7 +31,7 @@ from fastcontact.analysis.solution import (
     in_increments,
     response,
 )
-from fastcontact.arrays import Array, Indices, Mask, largest
+from fastcontact.arrays import Array, Indices, Mask, largest, numbers_at, scattered
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import lu_solver

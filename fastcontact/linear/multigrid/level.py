@@ -19,7 +19,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from fastcontact._jit.parallel import NODES_PER_CELL, parallel_for
-from fastcontact.arrays import AnyArray
+from fastcontact.arrays import AnyArray, mask_at
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.matrix import BlockMatrix
@@ -255,8 +255,7 @@ class CoarseLevel:
             return
         diagonal = A.diagonal()
         self._unstiffened = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
-        active = np.ones(self.n)
-        active[self._unstiffened] = 0.0
+        active = 1.0 - mask_at(self._unstiffened, self.n)
         K = diags_array(active) @ A @ diags_array(active) + diags_array(1.0 - active)
         self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, diags_array, vstack
 from scipy.sparse.linalg import splu
 
-from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.arrays import AnyArray, Array, Indices, mask_at
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -119,7 +119,6 @@ def compose(elimination: Elimination, followers: Elimination) -> tuple[Indices, 
     """
     T, S = elimination.weights, followers.weights
     T_of_followers = csr_array(T[:, followers.pivots])
-    free = np.ones(T.shape[1])
-    free[followers.pivots] = 0.0
+    free = 1.0 - mask_at(followers.pivots, T.shape[1])
     pivots = np.concatenate([elimination.pivots, followers.pivots])
     return pivots, csr_array(vstack([T @ diags_array(free) + T_of_followers @ S, S], format="csr"))

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import bsr_array, bsr_matrix, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import cg
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, mask_at
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
@@ -70,8 +70,7 @@ class Pyamg(LinearSolver):
         n = self.K.shape[0]
         self._elimination, self._T, A, modes = elimination, eye_array(n, format="csr"), self.K, self._modes
         if elimination is not None:
-            pivots, free = elimination.pivots, np.ones(n)
-            free[pivots] = 0.0
+            pivots, free = elimination.pivots, 1.0 - mask_at(elimination.pivots, n)
             rows_of_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
             self._T = csr_array(diags_array(free) + rows_of_pivots @ elimination.full_weights())
             A = self._T.T @ self.K @ self._T + diags_array((1.0 - free) * self.K.diagonal())
