@@ -285,15 +285,13 @@ class _SupportedEntries:
 
 def _with_diagonal(K: bsr_array) -> bsr_array:
     """Return K with a diagonal block in every block row; blocks that were not stored are zero."""
-    has_diagonal = np.zeros(len(K.indptr) - 1, bool)
-    block_row = np.repeat(np.arange(len(has_diagonal)), np.diff(K.indptr))
-    has_diagonal[block_row[block_row == K.indices]] = True
-    missing = np.flatnonzero(~has_diagonal)
+    block_row, n = entry_rows(K), len(K.indptr) - 1
+    missing = np.flatnonzero(~mask_at(block_row[block_row == K.indices], n))
     if not len(missing):
         return K
     size = K.blocksize[0]
     rows, columns = np.r_[block_row, missing], np.r_[K.indices, missing]
     order = np.lexsort((columns, rows))
     data = np.concatenate([K.data, np.zeros((len(missing), size, size))])[order]
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(has_diagonal)))])
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
     return bsr_array((data, columns[order], indptr), shape=K.shape)

@@ -19,6 +19,7 @@ from fastcontact.elasticity.loads import (
     Load,
     Table,
     Value,
+    ValueLoad,
     VolumeLoad,
     add_forces,
     check_points,
@@ -106,14 +107,10 @@ class Heating(Load):
         return total[:, 0]
 
 
-@dataclass(frozen=True)
-class HeatFlux(Heating):
+class HeatFlux(ValueLoad, Heating):
     """A heat flux [power / area] into the body through a group of facets."""
 
     KIND = "the heat flux"
-    group: str
-    value: Value
-    ramp: Table | None = None
 
 
 @dataclass(frozen=True)
@@ -126,14 +123,10 @@ class HeatSource(VolumeLoad, Heating):
     ramp: Table | None = None
 
 
-@dataclass(frozen=True)
-class NodalHeat(Heating):
+class NodalHeat(ValueLoad, Heating):
     """A heat flow [power] into each node of a group."""
 
     KIND = "the heat at nodes"
-    group: str
-    value: Value
-    ramp: Table | None = None
 
     def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "no heat can be supplied to it")

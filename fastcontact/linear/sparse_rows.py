@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, coo_array, csr_array, vstack
+from scipy.sparse import bsr_array, coo_array, csr_array, diags_array, vstack
 
-from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.arrays import AnyArray, Array, Indices, mask_at
 
 # Row numbers (n, k), column numbers (n, l) and values (n, k, l) of n dense blocks, such as the matrices of cells.
 Blocks = tuple[NDArray[np.integer], NDArray[np.integer], Array]
@@ -89,6 +89,12 @@ def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:
     result = csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
     # A copy, because the removal of zeros modifies the index arrays, which `matrix` shares.
     return result if factor.all() else without_zeros(result.copy())
+
+
+def substituted(rows: csr_array, pivots: Indices, weights: csr_array) -> csr_array:
+    """Return `rows` (m, n) after the substitution ``u[pivots] = weights @ u`` with weights (k, n)."""
+    others = rows @ diags_array(1.0 - mask_at(pivots, rows.shape[1]))
+    return csr_array(others + csr_array(rows[:, pivots]) @ weights)
 
 
 def taken(matrix: csr_array, rows: Indices) -> csr_array:

@@ -147,6 +147,4 @@ def _weights(B: csr_array, pivots: Indices, inverse: Inverse) -> csr_array:
 
 def _sparse_weights(inverse: SparseInverse, remainder: csr_array) -> csr_array:
     """Return the product (m, n) of the inverse of the pivot columns and the negative remaining columns `remainder` (m, n)."""
-    weights = csr_array(inverse.matrix @ remainder)
-    weights.sort_indices()
-    return weights
+    return csr_array(inverse.matrix @ remainder).sorted_indices()

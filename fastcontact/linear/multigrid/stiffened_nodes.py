@@ -17,8 +17,9 @@ import numpy as np
 from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, diags_array, vstack
 from scipy.sparse.linalg import splu
 
-from fastcontact.arrays import AnyArray, Array, Indices, mask_at
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.sparse_rows import substituted
 from fastcontact.round_off import SINGLE_PRECISION
 
 
@@ -117,8 +118,5 @@ def compose(elimination: Elimination, followers: Elimination) -> tuple[Indices, 
     weights : csr_array (m + q, n)
         Weights of all n unknowns in these values [-].
     """
-    T, S = elimination.weights, followers.weights
-    T_of_followers = csr_array(T[:, followers.pivots])
-    free = 1.0 - mask_at(followers.pivots, T.shape[1])
-    pivots = np.concatenate([elimination.pivots, followers.pivots])
-    return pivots, csr_array(vstack([T @ diags_array(free) + T_of_followers @ S, S], format="csr"))
+    pivots, S = np.concatenate([elimination.pivots, followers.pivots]), followers.weights
+    return pivots, csr_array(vstack([substituted(elimination.weights, followers.pivots, S), S], format="csr"))
