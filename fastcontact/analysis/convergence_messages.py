@@ -57,15 +57,19 @@ def geometry_not_converged(problem: Problem, history: list[dict[str, Any]], chan
     )
 
 
-def active_set_cycles(problem: Problem, constraints: StackedConstraints, solution: Solution, nodes: Nodes) -> str:
-    """Return the message for an active set that did not converge; `nodes` are those nearest to the constraints."""
+def active_set_cycles(
+    problem: Problem, constraints: StackedConstraints, solution: Solution, history: list[dict[str, Any]]
+) -> str:
+    """Return the message for an active set that did not converge, and add the nodes that change to the last entry."""
+    changed = np.flatnonzero(solution.active != solution.next_active)
+    nodes, count = nearest_nodes(problem, constraints, changed), len(changed)
+    history[-1]["nodes"] = nodes
     if constraints.tangents:
         return (
             f"contact with friction did not converge in {solution.iterations} Newton iterations from several starts: the "
             f"residual of its equations is {solution.residual:.1e} of the largest force. With the coefficient of friction "
             f"{constraints.friction.max():g} there may be no solution: use less friction"
         )
-    count = int((solution.active != solution.next_active).sum())
     constraints_text = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
     cause = f"{constraints_text}, at {named_nodes(problem, nodes)}" if count else "directions of slip still change"
     remedy = "the direct linear solver or " if problem.solver.iterative else ""
@@ -195,17 +199,14 @@ def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
     at a node, between supports of dual functions, or between branches of a cohesive law. Each remedy is for the first such
     pair in `nodes`, in which displacements change most.
     """
+    gaps = {name: pair.nodal_gap(Configuration.undeformed(pair.points))[0] for name, pair in problem.pairs.items()}
     for name, pair in problem.pairs.items():
         if pair.options.kind == "bilateral":
-            gap = pair.nodal_gap(Configuration.undeformed(pair.points))[0]
-            widest = float(gap.max(where=np.isfinite(gap), initial=0.0))
+            widest = float(gaps[name].max(where=np.isfinite(gaps[name]), initial=0.0))
             if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
                 return [f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close"]
     pairs = {name: problem.pairs[name] for name in nodes}
-    rigid = [name for name, pair in pairs.items() if isinstance(pair.primary, RigidSide)]
-    edged = [
-        name for name in rigid if np.isinf(pairs[name].nodal_gap(Configuration.undeformed(pairs[name].points))[0]).any()
-    ]
+    edged = [name for name, pair in pairs.items() if isinstance(pair.primary, RigidSide) and np.isinf(gaps[name]).any()]
     between_bodies = {name: pair for name, pair in pairs.items() if len(pair.primary.points)}
     faceted = [name for name, pair in between_bodies.items() if pair.normals == "facet"]
     dual = [name for name, pair in between_bodies.items() if getattr(pair, "multipliers", "") == "dual"]

@@ -24,7 +24,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact._tools.records import record, replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
-from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged, nearest_nodes
+from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction_increments import FrictionIncrements
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
@@ -118,9 +118,8 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
         raise
     if settled.nodes is None:
         return settled
-    return replace(
-        settled, solution=settled.nodes.with_distributed_forces(settled.solution, settled.constraints, iterate.u)
-    )
+    solution = settled.nodes.with_distributed_forces(settled.solution, settled.constraints, iterate.u)
+    return replace(settled, solution=solution)
 
 
 def _settle(
@@ -167,11 +166,7 @@ def _settle(
         iterate.u[problem.dofs.active] = displacement
         _store_solution(iterate, constraints, solution, relative_change)
         if not (solution.settled or accuracy.inexact):
-            nodes_that_change = nearest_nodes(
-                problem, constraints, np.flatnonzero(solution.active != solution.next_active)
-            )
-            iterate.history[-1]["nodes"] = nodes_that_change
-            text = active_set_cycles(problem, constraints, solution, nodes_that_change)
+            text = active_set_cycles(problem, constraints, solution, iterate.history)
             raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue

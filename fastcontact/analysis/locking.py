@@ -113,10 +113,8 @@ def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name:
         difference = N @ recovered[rows] - computed
         volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
         compliance, mean_weights = field.compliance[numbers][:, None], volume * selected[numbers, None]
-        integrals = [
-            *(twice_energy_density(values, compliance) * volume for values in (difference, computed)),
-            *(values[..., :3].mean(axis=2) ** 2 * mean_weights for values in (difference, computed)),
-        ]
+        integrals = [twice_energy_density(values, compliance) * volume for values in (difference, computed)]
+        integrals += [values[..., :3].mean(axis=2) ** 2 * mean_weights for values in (difference, computed)]
         np.add.at(sums, body[cells[:, 0]], np.sum(integrals, axis=2).T)
     return sums
 

@@ -109,9 +109,8 @@ def wear_work(depth: Array, earlier_depth: Array, forces: ContactForces, before:
     """
     if before is None:
         return 0.0
-    return 0.5 * float(
-        (forces.pressing_with(before, 2.0) + before.pressing_with(forces, 2.0)) @ (depth - earlier_depth)
-    )
+    pressing = forces.pressing_with(before, 2.0) + before.pressing_with(forces, 2.0)
+    return 0.5 * float(pressing @ (depth - earlier_depth))
 
 
 def linearisation_error(pair: Formulation, wear: WearCompliance, after: WearCompliance) -> float:

@@ -259,9 +259,8 @@ def with_fluid_pressure(
     pressure = np.where(wetted, config.fluid_pressure, 0.0)
     uncovered = constraints.nodal_field.uncovered(side, constraints.usable)
     first_of_node = mask_at(np.unique(node, return_index=True)[1], len(node))
-    partly_uncovered = np.zeros(len(wetted), bool)
-    for block, fraction in zip(side.blocks, uncovered, strict=True):
-        partly_uncovered[block.local[fraction > SINGLE_PRECISION]] = True
+    nodes = [block.local[fraction > SINGLE_PRECISION] for block, fraction in zip(side.blocks, uncovered, strict=True)]
+    partly_uncovered = mask_at(np.concatenate(nodes), len(wetted))
     rows = wetted[node] & (constraints.usable | (first_of_node & partly_uncovered[node]))
     row_areas = np.where(constraints.usable, constraints.areas, facet_size ** (points.shape[1] - 1))
     # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
@@ -331,9 +330,8 @@ def _transmitted_fraction(x: Array, gap: Array, vectors: Array, opposite: list[A
     each block [length], and `facet_size` the mean size of the secondary facets [length].
     """
     foot = closest_of_types(x, opposite)
-    cosine = -np.einsum("nd,nd->n", vectors, foot.normal) / np.maximum(
-        np.linalg.norm(vectors, axis=1), SINGLE_PRECISION
-    )
+    size = np.maximum(np.linalg.norm(vectors, axis=1), SINGLE_PRECISION)
+    cosine = -np.einsum("nd,nd->n", vectors, foot.normal) / size
     ratios = np.minimum(np.abs(gap), foot.distance) / (NARROW * facet_size), (1.0 - cosine) / NARROW
     return np.asarray(np.prod([np.clip(2.0 - ratio, 0.0, 1.0) for ratio in ratios], axis=0))
 

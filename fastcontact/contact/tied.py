@@ -30,7 +30,7 @@ from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.projection import facet_points, facets_containing
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.stiffness import rigid_modes
-from fastcontact.linear.sparse_rows import nodal_rows, without_zeros
+from fastcontact.linear.sparse_rows import nodal_rows, scaled, without_zeros
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
 
 
@@ -188,8 +188,9 @@ def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface
     # tangents if the vector across the gap is not normal to the surface.
     lengths = spurious @ np.linalg.pinv(tilts)
     lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (translation > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
-    tangents = [
-        csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ rows for j, rows in enumerate(derivatives)))
-        for k, tangent in enumerate(constraints.tangents)
-    ]
-    return replace(constraints, tangents=tuple(tangents) if lengths.any() else constraints.tangents)
+    if not lengths.any():
+        return constraints
+    arms = (sum(map(scaled, derivatives, lengths_of_tangent)) for lengths_of_tangent in np.moveaxis(lengths, 0, 2))
+    return replace(
+        constraints, tangents=tuple(csr_array(T - arm) for T, arm in zip(constraints.tangents, arms, strict=True))
+    )

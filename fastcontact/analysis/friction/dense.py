@@ -105,10 +105,8 @@ def solve(
     jammed = elastic_slip > SINGLE_PRECISION
     settled = (best.settled or best.residual <= LENGTH_ROUND_OFF) and not jammed
     residual = max(best.residual, elastic_slip) if jammed else best.residual
-    gaps = best.gaps * scale / force_units
-    return FrictionSolution(
-        best.y * scale * force_units, gaps, best.closed, best.sticking | equality, settled, residual, iterations
-    )
+    y, gaps = best.y * scale * force_units, best.gaps * scale / force_units
+    return FrictionSolution(y, gaps, best.closed, best.sticking | equality, settled, residual, iterations)
 
 
 @dataclass(eq=False, repr=False)

@@ -34,22 +34,22 @@ Solve = Callable[[Array], Array]
 class DependenceError(ConvergenceError):
     """Raised if constraints are linearly dependent."""
 
+    TEXT = (
+        "active contact constraints are linearly dependent, so that an iterative solver cannot eliminate them: leave out "
+        "one of two contacts on the same nodes, or use the direct solver"
+    )
+
     def __init__(self) -> None:
-        super().__init__(
-            "active contact constraints are linearly dependent, so that an iterative solver cannot eliminate them: leave out "
-            "one of two contacts on the same nodes, or use the direct solver"
-        )
+        super().__init__(self.TEXT)
 
 
 class CoupledError(DependenceError):
     """Raised if the equations of many nodes involve the same unknowns and cannot be eliminated."""
 
-    def __init__(self) -> None:
-        ConvergenceError.__init__(
-            self,
-            "active contact constraints of many nodes share unknowns, so that an iterative solver cannot eliminate them: use "
-            'multipliers="dual" or the direct solver',
-        )
+    TEXT = (
+        "active contact constraints of many nodes share unknowns, so that an iterative solver cannot eliminate them: use "
+        'multipliers="dual" or the direct solver'
+    )
 
 
 @record
