@@ -31,7 +31,7 @@ from fastcontact.analysis.inequalities import Iterate, StepContext, initially_ac
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import RESIDUAL, ScatterWindow, Tolerances
-from fastcontact.arrays import Array, largest
+from fastcontact.arrays import Array, largest, scattered
 from fastcontact.contact.constraints import Constraints, Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import SINGLE_PRECISION
@@ -196,8 +196,7 @@ def _settle(
             iterate.rounded = True
             mixing.accelerated, window = None, ScatterWindow()
     if problem.until_settled:
-        changes = np.zeros_like(iterate.u)
-        changes[problem.dofs.active] = displacement - before
+        changes = scattered(displacement - before, problem.dofs.active, len(iterate.u))
         raise ConvergenceError(geometry_not_converged(problem, iterate.history, changes, limit), iterate.history)
     increments.update(constraints, solution, 0.0, 0.0, iterate.u)
     if increments.due or increments.unfinished:

@@ -300,8 +300,7 @@ def _last_increment(
     no_gaps = np.zeros((1, len(rows)))
     along_tangents = np.stack([rotated(Q, np.vstack([no_gaps, along]), back=True)[1:] for along in components])
     m, dim = constraints.positions.shape
-    vectors, all_work, all_normal = np.zeros((3, m, dim)), np.zeros(m), np.zeros(m)
+    vectors = np.zeros((3, m, dim))
     vectors[:, rows] = np.einsum("pkm,kmd->pmd", along_tangents, np.stack(constraints.directions)[:, rows])
-    all_work[rows], all_normal[rows] = work, normal
     slip, slip_before_closing, traction = vectors
-    return LastIncrement(slip, slip_before_closing, traction, all_work, all_normal)
+    return LastIncrement(slip, slip_before_closing, traction, scattered(work, rows, m), scattered(normal, rows, m))

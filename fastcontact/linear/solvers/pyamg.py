@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import bsr_array, bsr_matrix, diags_array, eye_array
 from scipy.sparse.linalg import cg
 
-from fastcontact.arrays import Array, Indices, mask_at
+from fastcontact.arrays import Array, Indices, mask_at, scattered
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
@@ -95,9 +95,7 @@ class Pyamg(LinearSolver):
         """
         if elimination is not self._elimination:
             self._constrain(elimination)
-        t = np.zeros(len(f))
-        if elimination is not None:
-            t[elimination.pivots] = elimination.offset
+        t = np.zeros(len(f)) if elimination is None else scattered(elimination.offset, elimination.pivots, len(f))
         rhs = self._T.T @ (f - self.K @ t)
         v0 = None if guess is None else guess - t
         if v0 is not None and elimination is not None:
