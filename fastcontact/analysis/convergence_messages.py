@@ -199,14 +199,17 @@ def _advice_for_pairs(problem: Problem, nodes: Nodes) -> list[str]:
     at a node, between supports of dual functions, or between branches of a cohesive law. Each remedy is for the first such
     pair in `nodes`, in which displacements change most.
     """
-    gaps = {name: pair.nodal_gap(Configuration.undeformed(pair.points))[0] for name, pair in problem.pairs.items()}
     for name, pair in problem.pairs.items():
         if pair.options.kind == "bilateral":
-            widest = float(gaps[name].max(where=np.isfinite(gaps[name]), initial=0.0))
+            gap = pair.nodal_gap(Configuration.undeformed(pair.points))[0]
+            widest = float(gap.max(where=np.isfinite(gap), initial=0.0))
             if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
                 return [f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close"]
     pairs = {name: problem.pairs[name] for name in nodes}
-    edged = [name for name, pair in pairs.items() if isinstance(pair.primary, RigidSide) and np.isinf(gaps[name]).any()]
+    rigid = [name for name, pair in pairs.items() if isinstance(pair.primary, RigidSide)]
+    edged = [
+        name for name in rigid if np.isinf(pairs[name].nodal_gap(Configuration.undeformed(pairs[name].points))[0]).any()
+    ]
     between_bodies = {name: pair for name, pair in pairs.items() if len(pair.primary.points)}
     faceted = [name for name, pair in between_bodies.items() if pair.normals == "facet"]
     dual = [name for name, pair in between_bodies.items() if getattr(pair, "multipliers", "") == "dual"]
