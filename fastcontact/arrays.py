@@ -31,3 +31,22 @@ def is_masked(value: Any) -> bool:
     if isinstance(value, Mapping):
         return any(map(is_masked, value.values()))
     return isinstance(value, list | tuple) and any(map(is_masked, value))
+
+
+def scattered(values: Array | float, at: Indices | Numbers, shape: int | tuple[int, ...]) -> Array:
+    """Return an array of a `shape` with the `values` (n,), or one value, at the positions `at` (n,), and zeros elsewhere."""
+    result = np.zeros(shape)
+    result.ravel()[at] = values
+    return result
+
+
+def numbers_at(at: Indices | Numbers, shape: int | tuple[int, ...]) -> Indices:
+    """Return an array of a `shape` with the numbers 0 to n - 1 at the positions `at` (n,), and -1 elsewhere."""
+    result = np.full(shape, -1, np.intp)
+    result.ravel()[at] = np.arange(len(at))
+    return result
+
+
+def mask_at(at: AnyArray, n: int) -> Mask:
+    """Return the mask (n,) that is true at the positions `at`."""
+    return np.isin(np.arange(n), at)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact.analysis.criteria import NOTABLE
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, numbers_at
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.sparse_rows import without_round_off
@@ -61,8 +61,7 @@ class ActiveDofs:
         self.active, self.unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
         self.contact, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact, involved))
         self.springs = np.searchsorted(self.unknowns, springs)
-        self._numbers = np.full(len(all_dofs), -1, np.int32)  # of all unknowns among the active ones
-        self._numbers[self.unknowns] = np.arange(len(self.unknowns))
+        self._numbers = numbers_at(self.unknowns, len(all_dofs))  # of all unknowns among the active ones
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free
         self._system, self.T = system, csr_array(csr_array(T)[self.active][:, self.unknowns])

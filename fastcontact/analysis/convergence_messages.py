@@ -57,15 +57,19 @@ def geometry_not_converged(problem: Problem, history: list[dict[str, Any]], chan
     )
 
 
-def active_set_cycles(problem: Problem, constraints: StackedConstraints, solution: Solution, nodes: Nodes) -> str:
-    """Return the message for an active set that did not converge; `nodes` are those nearest to the constraints."""
+def active_set_cycles(
+    problem: Problem, constraints: StackedConstraints, solution: Solution, history: list[dict[str, Any]]
+) -> str:
+    """Return the message for an active set that did not converge, and add the nodes that change to the last entry."""
+    changed = np.flatnonzero(solution.active != solution.next_active)
+    nodes, count = nearest_nodes(problem, constraints, changed), len(changed)
+    history[-1]["nodes"] = nodes
     if constraints.tangents:
         return (
             f"contact with friction did not converge in {solution.iterations} Newton iterations from several starts: the "
             f"residual of its equations is {solution.residual:.1e} of the largest force. With the coefficient of friction "
             f"{constraints.friction.max():g} there may be no solution: use less friction"
         )
-    count = int((solution.active != solution.next_active).sum())
     constraints_text = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
     cause = f"{constraints_text}, at {named_nodes(problem, nodes)}" if count else "directions of slip still change"
     remedy = "the direct linear solver or " if problem.solver.iterative else ""

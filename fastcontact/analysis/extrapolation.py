@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact._tools.records import record, replace
 from fastcontact.analysis.tolerances import DECLINE
-from fastcontact.arrays import Array, Mask, largest
+from fastcontact.arrays import Array, Mask, largest, scattered
 
 # Gaps (m,) [length] and multipliers (m,) [force] of a pair.
 GapsAndForces = tuple[Array, Array]
@@ -166,6 +166,4 @@ def _sparse(values: Array) -> dict[str, Any]:
 
 def _dense(data: Mapping[str, Any]) -> Array:
     """Return the array (n,) from the result of `_sparse`."""
-    values = np.zeros(data["size"])
-    values[data["places"]] = data["values"]
-    return values
+    return scattered(data["values"], data["places"], data["size"])

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.analysis.criteria import NOTABLE, WARNING_ERROR
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Mask, mask_at
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import fine_rule, gauss_rule
@@ -100,8 +100,8 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     """Return the range of the sag at closed facets [length], and the ratio d / L of the module's docstring [-]."""
     rules = [_rule(pair, block.element) for block in pair.secondary.blocks]
     points = Candidates.in_facets(pair.secondary, [xi for xi, _ in rules])
-    deformed, closed = pair.points + configuration.displacement, np.zeros(len(pair.points), bool)
-    closed[pair.secondary.points[active]] = True
+    deformed = pair.points + configuration.displacement
+    closed = mask_at(pair.secondary.points[active], len(pair.points))
     extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), facet_length(pair.secondary, pair.points))
     if isinstance(pair.primary, RigidSide):
         rows = np.flatnonzero(closed[points.nodes].all(axis=1))

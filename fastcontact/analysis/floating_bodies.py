@@ -221,9 +221,8 @@ class FloatingBodies:
         # prevent.
         moving_points = moving.any(axis=1).reshape(-1, self._dim).any(axis=1)
         spring_sums = [s.stiffness.sum() for s in model_springs if moving_points[s.rows.indices // self._dim].any()]
-        self.stiffness = min(
-            SOFT * typical if soft else typical, max(SINGLE_PRECISION * typical, min(spring_sums, default=np.inf))
-        )
+        softest = max(SINGLE_PRECISION * typical, min(spring_sums, default=np.inf))
+        self.stiffness = min(SOFT * typical if soft else typical, softest)
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
         """Return the sum of `matrix` (n_dofs, n_dofs) and the stiffness of the springs [force / length]."""

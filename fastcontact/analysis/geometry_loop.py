@@ -26,14 +26,14 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact._tools.records import record, replace
 from fastcontact.analysis.anderson import DEPTH, Anderson
-from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged, nearest_nodes
+from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_not_converged
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction_increments import FrictionIncrements
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import DECLINE, RESIDUAL, WINDOW, ScatterWindow, Tolerances
-from fastcontact.arrays import Array, largest
+from fastcontact.arrays import Array, largest, scattered
 from fastcontact.contact.constraints import Constraints, Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import SINGLE_PRECISION
@@ -117,9 +117,8 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
         raise
     if settled.nodes is None:
         return settled
-    return replace(
-        settled, solution=settled.nodes.with_distributed_forces(settled.solution, settled.constraints, iterate.u)
-    )
+    solution = settled.nodes.with_distributed_forces(settled.solution, settled.constraints, iterate.u)
+    return replace(settled, solution=solution)
 
 
 def _settle(
@@ -166,11 +165,7 @@ def _settle(
         iterate.u[problem.dofs.active] = displacement
         _store_solution(iterate, constraints, solution, relative_change)
         if not (solution.settled or accuracy.inexact):
-            nodes_that_change = nearest_nodes(
-                problem, constraints, np.flatnonzero(solution.active != solution.next_active)
-            )
-            iterate.history[-1]["nodes"] = nodes_that_change
-            text = active_set_cycles(problem, constraints, solution, nodes_that_change)
+            text = active_set_cycles(problem, constraints, solution, iterate.history)
             raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue
@@ -200,8 +195,7 @@ def _settle(
             iterate.rounded = True
             mixing.accelerated, window = None, ScatterWindow()
     if problem.until_settled:
-        changes = np.zeros_like(iterate.u)
-        changes[problem.dofs.active] = displacement - before
+        changes = scattered(displacement - before, problem.dofs.active, len(iterate.u))
         raise ConvergenceError(geometry_not_converged(problem, iterate.history, changes, limit), iterate.history)
     increments.update(constraints, solution, 0.0, 0.0, iterate.u)
     if increments.due or increments.unfinished:

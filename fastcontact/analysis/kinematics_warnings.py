@@ -154,9 +154,8 @@ def _neglected_rotation(
         return
     capacity = _frictional_capacity(problem, last)
     # The moment out of balance does twice the neglected work in a rotation. The neglected strain also changes pressures.
-    moment_error = ratio + np.divide(
-        2.0 * np.abs(neglected), capacity, out=np.zeros(len(capacity)), where=capacity > 0.0
-    )
+    out_of_balance = np.divide(2.0 * np.abs(neglected), capacity, out=np.zeros_like(ratio), where=capacity > 0.0)
+    moment_error = ratio + out_of_balance
     worst = int(np.argmax(np.where(capacity > 0.0, moment_error, 0.0)))
     if capacity[worst] > 0.0 and moment_error[worst] > MOMENT_ERROR:
         name = body_name(mesh, bodies(mesh)[1], worst)

@@ -113,10 +113,8 @@ def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name:
         difference = N @ recovered[rows] - computed
         volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
         compliance, mean_weights = field.compliance[numbers][:, None], volume * selected[numbers, None]
-        integrals = [
-            *(twice_energy_density(values, compliance) * volume for values in (difference, computed)),
-            *(values[..., :3].mean(axis=2) ** 2 * mean_weights for values in (difference, computed)),
-        ]
+        integrals = [twice_energy_density(values, compliance) * volume for values in (difference, computed)]
+        integrals += [values[..., :3].mean(axis=2) ** 2 * mean_weights for values in (difference, computed)]
         np.add.at(sums, body[cells[:, 0]], np.sum(integrals, axis=2).T)
     return sums
 
@@ -237,9 +235,7 @@ def relative_excess(problem: Problem, u: Array, excess: ExcessStiffness) -> floa
     system, n, zero = problem.system, problem.model.n_dofs, np.zeros(len(u))
 
     def excess_force(displacement: Array) -> Array:
-        force = np.zeros(len(u))
-        force[:n] = excess.force(problem.displacement(displacement)).ravel()
-        return force
+        return np.pad(excess.force(problem.displacement(displacement)).ravel(), (0, len(u) - n))
 
     def reference_force(v: Array) -> Array:
         displacement = system.displacement(v, zero)

@@ -250,13 +250,10 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
 
 def _uniform_quotient(model: Model, K: bsr_array, M: bsr_array) -> float:
     """Return the least Rayleigh quotient [1 / time^2] of uniform deformations, each linear in one coordinate."""
-    points, quotients = model.mesh.points - model.mesh.points.mean(axis=0), []
-    for component in range(model.mesh.dim):
-        for axis in range(model.mesh.dim):
-            u = np.zeros_like(points)
-            u[:, component] = points[:, axis]
-            quotients.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
-    return min((quotient for quotient in quotients if quotient > 0.0), default=1.0)
+    points = model.mesh.points - model.mesh.points.mean(axis=0)
+    u = np.kron(points, np.eye(model.mesh.dim))  # a column for each coordinate and component
+    quotients = (u * (K @ u)).sum(axis=0) / (u * (M @ u)).sum(axis=0)
+    return float(min(quotients[quotients > 0.0], default=1.0))
 
 
 def _modes(

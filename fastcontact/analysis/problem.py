@@ -16,9 +16,8 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
-from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, scattered
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
@@ -273,7 +272,7 @@ class Problem:
         """
         zero, side, wear = np.zeros(self.model.mesh.dim), self.pairs[name].secondary, state.wear.get(name)
         worn = wear or state.worn.get(name)
-        depth = None if worn is None else at_points(side.points, worn.depth, self.model.mesh.n_points)
+        depth = None if worn is None else scattered(worn.depth, side.points, self.model.mesh.n_points)
         return Configuration(
             self.displacement(u),
             self.displacement(state.u),

@@ -259,10 +259,15 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     vectors = {"force": axes, "moment": "z" if model.mesh.dim == 2 else axes, "centre": axes}
     quantities = [field.name for field in fields(ContactResultants)]
     columns = [f"{name}_{axis}" if axis else name for name in quantities for axis in vectors.get(name, [""])]
-    rows = [
-        (step.index, step.load_factor, *np.hstack([getattr(resultants, quantity) for quantity in quantities]))
-        for step, resultants in zip(steps, contact_resultants(model, steps, name), strict=True)
-    ]
+    of_steps = contact_resultants(model, steps, name)
+    return _history(steps, columns, [np.hstack([getattr(values, name) for name in quantities]) for values in of_steps])
+
+
+def _history(
+    steps: Sequence[StepResult], columns: Sequence[str], values: Iterable[Iterable[float]]
+) -> NDArray[np.void]:
+    """Return a table with one row for each step: its number and load factor, and `values` with the names `columns`."""
+    rows = [(step.index, step.load_factor, *row) for step, row in zip(steps, values, strict=True)]
     return np.array(rows, [("step", int), *((column, float) for column in ("load_factor", *columns))])
 
 
@@ -538,9 +543,7 @@ def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
     names = list(dict.fromkeys(name for step in steps for name in step.pretension))
     quantities = [(name, quantity) for name in names for quantity in ("force", "shortening")]
     values = ([step.pretension.get(name, {}).get(quantity, np.nan) for name, quantity in quantities] for step in steps)
-    rows = [(step.index, step.load_factor, *row) for step, row in zip(steps, values, strict=True)]
-    columns = [(f"{name}_{quantity}", float) for name, quantity in quantities]
-    return np.array(rows, [("step", int), ("load_factor", float), *columns])
+    return _history(steps, [f"{name}_{quantity}" for name, quantity in quantities], values)
 
 
 def _check(model: Model, step: StepResult) -> None:

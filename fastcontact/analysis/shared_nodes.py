@@ -104,10 +104,8 @@ class SharedNodes:
     def _tangents(self, constraints: Constraints) -> tuple[csr_array, ...]:
         """Return the rows (m, n_dofs) of the mean slip of each representative along its own tangents."""
         products = np.einsum("mjd,mkd->kjm", self.frame, self.frame[self.representative]) * self.tangential_fraction
-        tangents = constraints.tangents
-        return tuple(
-            csr_array(sum(self._sums @ scaled(T, factor) for factor, T in zip(row, tangents))) for row in products
-        )
+        weighted = ([scaled(T, factor) for factor, T in zip(row, constraints.tangents)] for row in products)
+        return tuple(csr_array(self._sums @ sum(rows[1:], rows[0])) for rows in weighted)
 
     def _weighted_sum(self, components: Array, weight: Array) -> Array:
         """Return the sums (m, k) of vectors times `weight` (m,) over the constraints of each representative.

@@ -163,9 +163,8 @@ def _steady_temperatures(heat: Heat, step: StepContext, equilibrium: StepEquilib
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential * solution.slip).sum(axis=1), 0.0)
             friction_power += link.nodal_powers(pair.options.friction_heat * work / (load.instant - step.state.instant))
-    steady = heat.temperatures(
-        load.instant, displacement, contact_matrix, friction_power, (obstacle_matrix, obstacle_power)
-    )
+    obstacles = obstacle_matrix, obstacle_power
+    steady = heat.temperatures(load.instant, displacement, contact_matrix, friction_power, obstacles)
     fluxes, heat_flows = {}, {}
     for name, (link, field, h, obstacle_rise, area_ratio) in conducting.items():
         power = h * link.area * (link.jump @ steady.rise - obstacle_rise)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fastcontact.analysis.work import ContactForces
-from fastcontact.arrays import Array, Numbers, largest
+from fastcontact.arrays import Array, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import facet_measure, fine_rule
@@ -109,9 +109,8 @@ def wear_work(depth: Array, earlier_depth: Array, forces: ContactForces, before:
     """
     if before is None:
         return 0.0
-    return 0.5 * float(
-        (forces.pressing_with(before, 2.0) + before.pressing_with(forces, 2.0)) @ (depth - earlier_depth)
-    )
+    pressing = forces.pressing_with(before, 2.0) + before.pressing_with(forces, 2.0)
+    return 0.5 * float(pressing @ (depth - earlier_depth))
 
 
 def linearisation_error(pair: Formulation, wear: WearCompliance, after: WearCompliance) -> float:
@@ -148,13 +147,6 @@ def _linear_on_facets(pair: Formulation, values: Array) -> Array:
         shape = element.corner_shape(element.nodes)
         linear[block.local] = means[block.local[:, : shape.shape[1]]] @ shape.T
     return linear
-
-
-def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
-    """Return wear depths (m,) at `points` (m,) as depths of all points (n_points,), zero elsewhere [length]."""
-    depths = np.zeros(n_points)
-    depths[points] = depth
-    return depths
 
 
 def ratio_to_elastic_waves(pair: Formulation, worn: Worn) -> float:

@@ -46,16 +46,13 @@ def newton_with_wear(begin: StepContext, before: StepEquilibrium | None = None) 
         equilibrium = newton(begin, equilibrium)
         wear = {name: _wear_of_solution(begin, equilibrium, name) for name in sides}
         largest_depth = max(largest(after.depth - depth_at_start[name]) for name, after in wear.items())
-        errors.append(
-            max(linearisation_error(problem.pairs[name], begin.state.wear[name], after) for name, after in wear.items())
-        )
+        assumed = begin.state.wear
+        errors.append(max(linearisation_error(problem.pairs[name], assumed[name], wear[name]) for name in wear))
         if errors[-1] <= max(problem.criteria.relative * largest_depth, start.gap_round_off):
             break
         if len(errors) > WINDOW and min(errors[-WINDOW:]) > DECLINE * min(errors[:-WINDOW]):
-            log.info(
-                "wear depths do not converge: they still change by %.1e of the largest in this step",
-                errors[-1] / largest_depth,
-            )
+            change = errors[-1] / largest_depth
+            log.info("wear depths do not converge: they still change by %.1e of the largest in this step", change)
             break
     return replace(equilibrium, wear=wear)
 

@@ -19,7 +19,7 @@ from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.argument_types import number_pairs
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, mask_at
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -155,10 +155,7 @@ def heat_transfer(
     no points and thus no weights. `shape` is that of the points of the mesh, (n_points, dim).
     """
     n, dim = shape
-    on_secondary = np.zeros(n, bool)
-    on_secondary[secondary.points] = True
-    if isinstance(primary, Surface):
-        on_secondary[primary.points] = False
+    on_secondary = mask_at(np.setdiff1d(secondary.points, primary.points), n)
     components = [csr_array(constraints.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
     normal = np.stack([matrix @ on_secondary for matrix in components], axis=1)
     square = np.einsum("md,md->m", normal, normal)

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.sparse import csr_array, diags_array, hstack, vstack
+from scipy.sparse import csr_array, hstack, vstack
 
 from fastcontact._tools.records import field, record, replace
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
@@ -19,6 +19,7 @@ from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface, by_block
 from fastcontact.linear.field_compliance import FieldCompliance
+from fastcontact.linear.sparse_rows import scaled
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
@@ -361,11 +362,8 @@ class Constraints:
         """Return a copy in which the constraints that the mask `open_constraints` (m,) marks cannot close."""
         if not open_constraints.any():
             return self
-        keep = diags_array((~open_constraints).astype(float))
-        rows = [csr_array(keep @ matrix) for matrix in (self.B, *self.tangents)]
-        for matrix in rows:
-            matrix.eliminate_zeros()
-        return replace(self, B=rows[0], tangents=tuple(rows[1:]))
+        B, *tangents = (scaled(matrix, 1.0 - open_constraints) for matrix in (self.B, *self.tangents))
+        return replace(self, B=B, tangents=tuple(tangents))
 
     def gaps_at_rest(self) -> Array:
         """Return the gaps and the slips along each tangent (1 + k, m) at u = 0 without contact forces [length]."""

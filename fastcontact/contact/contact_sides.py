@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, numbers_at
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.held_motions import HeldMotions, reflected, symmetry_planes
 from fastcontact.contact.linearised_projections import ObstaclePoints, Points, SurfacePoints
@@ -135,10 +135,8 @@ class ContactSides:
 
     @cached_property
     def number_on_side(self) -> Indices:
-        """Number (n_points,) of each secondary node on its side; zero for other points."""
-        numbers = np.zeros(len(self.points), np.intp)
-        numbers[self.secondary.points] = np.arange(len(self.secondary.points))
-        return numbers
+        """Number (n_points,) of each secondary node on its side; -1 for other points."""
+        return numbers_at(self.secondary.points, len(self.points))
 
     def _secondary_normals(self, candidates: Candidates, config: Configuration) -> Array:
         """Return averaged unit normals (n, dim) of the secondary side at candidates."""

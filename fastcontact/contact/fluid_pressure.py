@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from fastcontact._tools.records import record, replace
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, mask_at
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.integration import facet_measure, fine_rule
@@ -32,7 +32,7 @@ from fastcontact.contact.projection import (
     facet_points,
 )
 from fastcontact.contact.surface import Surface
-from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of
+from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, without_zeros
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors, weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -250,11 +250,10 @@ def with_fluid_pressure(
     # Where no contact is possible, the first row of each node transmits the force.
     pressure = np.where(wetted, config.fluid_pressure, 0.0)
     uncovered = constraints.nodal_field.uncovered(side, constraints.usable)
-    first_of_node = np.zeros(len(node), bool)
-    first_of_node[np.unique(node, return_index=True)[1]] = True
-    partly_uncovered = np.zeros(len(wetted), bool)
-    for block, fraction in zip(side.blocks, uncovered, strict=True):
-        partly_uncovered[block.local[np.abs(fraction) > SINGLE_PRECISION]] = True
+    first_of_node = mask_at(np.unique(node, return_index=True)[1], len(node))
+    of_blocks = zip(side.blocks, uncovered, strict=True)
+    nodes = [block.local[np.abs(fraction) > SINGLE_PRECISION] for block, fraction in of_blocks]
+    partly_uncovered = mask_at(np.concatenate(nodes), len(wetted))
     rows = wetted[node] & (constraints.usable | (first_of_node & partly_uncovered[node]))
     row_areas = np.where(constraints.usable, constraints.areas, facet_size ** (points.shape[1] - 1))
     # A force that does not depend on the gap is represented by a linear law of small slope, whose force vanishes at a gap
@@ -313,9 +312,7 @@ def _rows_along_area_vectors(
     weights = csr_array((values, (row[replaced], point[replaced])), shape=(m, n_dofs // dim))
     area_ratio = np.where(rows, -np.einsum("md,md->m", vectors, normal) * transmitted, 1.0)
     other_entries = csr_array((entries.data * area_ratio[row] * ~replaced, (row, entries.col)), shape=B.shape)
-    with_area_vectors = csr_array(other_entries + rows_of(weights, -vectors))
-    with_area_vectors.eliminate_zeros()
-    return with_area_vectors, weights
+    return without_zeros(csr_array(other_entries + rows_of(weights, -vectors))), weights
 
 
 def _transmitted_fraction(x: Array, gap: Array, vectors: Array, opposite: list[Array], facet_size: float) -> Array:
@@ -326,9 +323,8 @@ def _transmitted_fraction(x: Array, gap: Array, vectors: Array, opposite: list[A
     each block [length], and `facet_size` the mean size of the secondary facets [length].
     """
     foot = closest_of_types(x, opposite)
-    cosine = -np.einsum("nd,nd->n", vectors, foot.normal) / np.maximum(
-        np.linalg.norm(vectors, axis=1), SINGLE_PRECISION
-    )
+    size = np.maximum(np.linalg.norm(vectors, axis=1), SINGLE_PRECISION)
+    cosine = -np.einsum("nd,nd->n", vectors, foot.normal) / size
     ratios = np.minimum(np.abs(gap), foot.distance) / (NARROW * facet_size), (1.0 - cosine) / NARROW
     return np.asarray(np.prod([np.clip(2.0 - ratio, 0.0, 1.0) for ratio in ratios], axis=0))
 

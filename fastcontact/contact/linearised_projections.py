@@ -185,10 +185,8 @@ class SurfacePoints:
             return np.zeros_like(self.axes)  # straight lines
         # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
         steps = 0.5 * np.eye(xi.shape[1])
-        above, below = (
-            [facet_points(primary.surface, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0)
-        )
-        second = np.stack(above, axis=3) - np.stack(below, axis=3)
+        gradients = [[facet_points(primary.surface, facet, xi + h).gradient for h in (step, -step)] for step in steps]
+        second = np.stack([above - below for above, below in gradients], axis=3)
         curvature = np.einsum("nkij,nkd,nd->nij", second, primary.coordinates[self._feet.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
 
@@ -231,9 +229,8 @@ class SurfacePoints:
         curvature = np.einsum("nid,njd->nij", self._normal_gradient, self.axes)
         slopes = self._feet.gradient[..., None] * self.normal[:, None, None]
         tilts = [nodal_rows(self._feet.nodes, slopes[:, :, i], n_dofs) for i in axes]
-        d_xi = [
-            rows_of(self.motion, dual[:, i]) + sum(scaled(tilts[j], gap * metric[:, i, j]) for j in axes) for i in axes
-        ]
+        tilt_sums = [sum(scaled(tilts[j], gap * metric[:, i, j]) for j in axes) for i in axes]
+        d_xi = [rows_of(self.motion, dual[:, i]) + tilt_sums[i] for i in axes]
         K = csr_array((n_dofs, n_dofs))
         for i in axes:
             K += 2.0 * tilts[i].T @ scaled(d_xi[i], force)

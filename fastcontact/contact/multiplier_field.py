@@ -14,7 +14,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
 from fastcontact.linear.delassus import MAX_ROWS
 from fastcontact.linear.field_compliance import FieldCompliance
-from fastcontact.linear.sparse_rows import scaled
+from fastcontact.linear.sparse_rows import scaled, without_zeros
 
 
 @record
@@ -78,9 +78,8 @@ class Projection:
             return self.block(rows)
         weights = np.where(self.areas > 0, self.areas, 0.0) / self.rho
         weights[rows] = 0.0
-        mass_of_other_points, areas = csr_array(self.P.T @ diags_array(weights) @ self.P), self.areas[rows]
-        mass_of_other_points.eliminate_zeros()
-        P, stiffness = csr_array(self.P[rows]), self.rho * areas
+        mass_of_other_points = without_zeros(csr_array(self.P.T @ diags_array(weights) @ self.P))
+        P, areas, stiffness = csr_array(self.P[rows]), self.areas[rows], self.rho * self.areas[rows]
         return FieldCompliance(P, areas, stiffness, mass_of_other_points, lambda: self.block(rows), self.quadratic)
 
     def apply(self, multiplier: Array) -> Array:

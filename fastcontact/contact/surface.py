@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._tools.records import record, replace
-from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
+from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers, numbers_at
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -276,8 +276,7 @@ def surface(mesh: Mesh, group: str) -> Surface:
         rows = outer_rows(mesh, group, name, block, ContactError, remedy)
         facets[name] = outer_facets(mesh)[name][np.unique(rows)]
     points, abscissa = _ordered(mesh, group, facets)
-    position = np.full(mesh.n_points, -1, np.intp)
-    position[points] = np.arange(len(points))
+    position = numbers_at(points, mesh.n_points)
     blocks = tuple(FacetBlock(name, block, position[block]) for name, block in facets.items())
     return Surface(group, blocks, points, abscissa)
 

@@ -20,6 +20,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.polynomial.polynomial import polyvander
 from scipy.sparse import csr_array
 
 from fastcontact._tools.records import record, replace
@@ -326,10 +327,7 @@ def _powers(dim: int, degree: int) -> tuple[Indices, Indices]:
 
 def _terms(x: Array, i: Indices, j: Indices) -> Array:
     """Return the terms with exponents `i` and `j` (n_terms,) at coordinates (..., 1 or 2)."""
-    powers = [np.ones_like(x)]
-    for _ in range(int(i.max())):
-        powers.append(powers[-1] * x)
-    table = np.stack(powers, axis=-1)
+    table = polyvander(x, int(i.max()))
     return np.asarray(table[..., 0, i] * table[..., -1, j])
 
 

@@ -30,7 +30,7 @@ from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.projection import facet_points, facets_containing
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.stiffness import rigid_modes
-from fastcontact.linear.sparse_rows import nodal_rows
+from fastcontact.linear.sparse_rows import nodal_rows, scaled, without_zeros
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
 
 
@@ -111,8 +111,7 @@ def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
 def _without_round_off(rows: csr_array) -> csr_array:
     """Remove the entries of a matrix that are zero up to round-off, in place, and return the matrix."""
     rows.data[np.abs(rows.data) < ROUND_OFF * np.abs(rows.data).max(initial=0.0)] = 0.0
-    rows.eliminate_zeros()
-    return rows
+    return without_zeros(rows)
 
 
 def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, adjacency: csr_array) -> csr_array:
@@ -154,9 +153,7 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, adjacenc
     blocks[np.abs(blocks) < ROUND_OFF] = 0.0
     row, column = (np.arange(dim) * q + node[:, None] for node in (rows, columns))
     row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
-    matrix = csr_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=(q * dim, q * dim))
-    matrix.eliminate_zeros()
-    return matrix
+    return without_zeros(csr_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=(q * dim, q * dim)))
 
 
 def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
@@ -191,8 +188,9 @@ def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface
     # tangents if the vector across the gap is not normal to the surface.
     lengths = spurious @ np.linalg.pinv(tilts)
     lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (translation > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
-    tangents = [
-        csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ rows for j, rows in enumerate(derivatives)))
-        for k, tangent in enumerate(constraints.tangents)
-    ]
-    return replace(constraints, tangents=tuple(tangents) if lengths.any() else constraints.tangents)
+    if not lengths.any():
+        return constraints
+    arms = (sum(map(scaled, derivatives, lengths_of_tangent)) for lengths_of_tangent in np.moveaxis(lengths, 0, 2))
+    return replace(
+        constraints, tangents=tuple(csr_array(T - arm) for T, arm in zip(constraints.tangents, arms, strict=True))
+    )

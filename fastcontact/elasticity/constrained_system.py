@@ -16,10 +16,10 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Indices, Mask, largest
+from fastcontact.arrays import Array, Indices, Mask, largest, mask_at
 from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate
 from fastcontact.errors import ModelError
-from fastcontact.linear.sparse_rows import entry_rows, stacked_rows
+from fastcontact.linear.sparse_rows import entry_rows, stacked_rows, without_zeros
 from fastcontact.round_off import ROUND_OFF
 
 # Relative tolerance within which supports and constraints must be consistent.
@@ -74,9 +74,7 @@ class ConstrainedMotion:
             return
         self._elimination: Elimination = eliminate(stacked_rows(relations, len(fixed)), fixed)
         self.free[self._elimination.pivots] = False
-        T = csr_array(self._elimination.T @ diags_array(self.free.astype(float)))
-        T.eliminate_zeros()
-        self.T = T
+        self.T = without_zeros(csr_array(self._elimination.T @ diags_array(self.free.astype(float))))
 
     def lift(self, prescribed: Array, multipliers: Sequence[float]) -> Array:
         """Return t (n,) for prescribed displacements (n,) [length] and the load multiplier of each constraint [-].
@@ -138,8 +136,7 @@ class System(ConstrainedMotion):
         self, K: bsr_array, supported: Mask, relations: Sequence[MultiPointConstraint], without_stiffness: Mask
     ) -> None:
         R = stacked_rows(relations, K.shape[0])
-        constrained = np.zeros(K.shape[0], bool)
-        constrained[R.indices] = True
+        constrained = mask_at(R.indices, K.shape[0])
         diagonal = K.diagonal()
         super().__init__(supported | ((diagonal == 0.0) & ~constrained & ~without_stiffness), relations)
         self._reacting: Mask = self.fixed | constrained  # supports and constraints may exert forces here
@@ -199,8 +196,7 @@ class System(ConstrainedMotion):
         offset = offset + rows @ t
         rows = rows.copy() if self.T is None else csr_array(rows @ self.T)
         rows.data[~self.free[rows.indices]] = 0.0
-        rows.eliminate_zeros()
-        return rows, offset
+        return without_zeros(rows), offset
 
     def displacement(self, v: Array, t: Array) -> Array:
         """Return all displacements u (n,) [length]."""
@@ -284,22 +280,18 @@ class _SupportedEntries:
         entries[self._positions] = 0.0
         entries[self._positions[self._diagonal]] = diagonal
         removed[self._diagonal] -= diagonal
-        difference = csr_array((removed, self._columns, self._start), shape=K.shape, copy=True)
-        difference.eliminate_zeros()
-        return difference
+        return without_zeros(csr_array((removed, self._columns, self._start), shape=K.shape, copy=True))
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:
     """Return K with a diagonal block in every block row; blocks that were not stored are zero."""
-    has_diagonal = np.zeros(len(K.indptr) - 1, bool)
-    block_row = np.repeat(np.arange(len(has_diagonal)), np.diff(K.indptr))
-    has_diagonal[block_row[block_row == K.indices]] = True
-    missing = np.flatnonzero(~has_diagonal)
+    block_row, n = entry_rows(K), len(K.indptr) - 1
+    missing = np.flatnonzero(~mask_at(block_row[block_row == K.indices], n))
     if not len(missing):
         return K
     size = K.blocksize[0]
     rows, columns = np.r_[block_row, missing], np.r_[K.indices, missing]
     order = np.lexsort((columns, rows))
     data = np.concatenate([K.data, np.zeros((len(missing), size, size))])[order]
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(has_diagonal)))])
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
     return bsr_array((data, columns[order], indptr), shape=K.shape)

@@ -121,13 +121,18 @@ class Load:
 
 
 @dataclass(frozen=True)
-class Pressure(Load):
-    """A pressure [pressure] on a group of outer facets. If it is positive, it acts against their outward normals."""
+class ValueLoad(Load):
+    """Base class of loads with one value on a group."""
 
-    KIND = "the pressure"
     group: str
     value: Value
     ramp: Table | None = None
+
+
+class Pressure(ValueLoad):
+    """A pressure [pressure] on a group of outer facets. If it is positive, it acts against their outward normals."""
+
+    KIND = "the pressure"
 
     def cells(self, mesh: Mesh) -> dict[str, Numbers]:
         """Return the facets (n, n_nodes) of int by element type, with outward normals."""

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, mask_at
 
 Table = tuple[tuple[float, float], ...]
 # Coefficients below this fraction of the largest coefficient in their row are considered round-off due to cancellation.
@@ -136,8 +136,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
         coefficient = row.pop(pivot)
         _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressions, users)
     pivots, origin = np.array([*expressions], np.intp), np.array([*conditions], np.intp)
-    not_pivot = np.ones(n)
-    not_pivot[pivots] = 0.0
+    not_pivot = 1.0 - mask_at(pivots, n)
     pivot_rows = _rows(expressions, (n, n + m))
     T, S = csr_array(pivot_rows[:, :n] + diags_array(not_pivot)), csr_array(pivot_rows[:, n:])
     return Elimination(pivots, T, S, _rows(dict(enumerate(conditions.values())), (len(conditions), n + m)), origin)

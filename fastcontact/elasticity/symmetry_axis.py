@@ -11,8 +11,5 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 def axis_nodes(mesh: Mesh) -> Indices:
     """Return the nodes (n,) of solid cells on the axis x = 0, in ascending order."""
-    on_axis = np.abs(mesh.points[:, 0]) <= SINGLE_PRECISION * np.abs(mesh.points).max()
-    in_solid = np.zeros(mesh.n_points, bool)
-    for block in mesh.solids.values() if on_axis.any() else ():
-        in_solid[block] = True
-    return np.flatnonzero(on_axis & in_solid)
+    on_axis = np.flatnonzero(np.abs(mesh.points[:, 0]) <= SINGLE_PRECISION * np.abs(mesh.points).max())
+    return on_axis[np.any([np.isin(on_axis, block) for block in mesh.solids.values()], axis=0)]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, scattered
 from fastcontact.elasticity import loads
 from fastcontact.elasticity.loads import Table, Value, check_number, check_value, evaluated
 from fastcontact.errors import ModelError
@@ -68,12 +68,11 @@ class Temperature:
     def rise(self, mesh: Mesh) -> Array:
         """Return the rise above the reference (n_points,) [temperature] at multiplier 1; it is zero outside the groups."""
         points = loads.solid_points(mesh, self.groups)
-        rise = np.zeros(mesh.n_points)
         if isinstance(self.value, np.ndarray):
-            rise[points] = self.value[points] - self.reference
+            values = self.value[points]
         else:
-            rise[points] = evaluated(self.value, mesh.points[points], self.name) - self.reference
-        return rise
+            values = evaluated(self.value, mesh.points[points], self.name)
+        return scattered(values - self.reference, points, mesh.n_points)
 
 
 def temperature_history(

@@ -14,11 +14,12 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, scattered
 from fastcontact.elasticity.loads import (
     Load,
     Table,
     Value,
+    ValueLoad,
     VolumeLoad,
     add_forces,
     check_points,
@@ -106,14 +107,10 @@ class Heating(Load):
         return total[:, 0]
 
 
-@dataclass(frozen=True)
-class HeatFlux(Heating):
+class HeatFlux(ValueLoad, Heating):
     """A heat flux [power / area] into the body through a group of facets."""
 
     KIND = "the heat flux"
-    group: str
-    value: Value
-    ramp: Table | None = None
 
 
 @dataclass(frozen=True)
@@ -126,23 +123,18 @@ class HeatSource(VolumeLoad, Heating):
     ramp: Table | None = None
 
 
-@dataclass(frozen=True)
-class NodalHeat(Heating):
+class NodalHeat(ValueLoad, Heating):
     """A heat flow [power] into each node of a group."""
 
     KIND = "the heat at nodes"
-    group: str
-    value: Value
-    ramp: Table | None = None
 
     def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "no heat can be supplied to it")
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
         """Return the heat flows (n_points,) [power] at multiplier 1; see `Heating.power`."""
-        total, nodes = np.zeros(mesh.n_points), mesh.points_of(self.group)
-        total[nodes] = evaluated(self.value, mesh.points[nodes], self.name)
-        return total
+        nodes = mesh.points_of(self.group)
+        return scattered(evaluated(self.value, mesh.points[nodes], self.name), nodes, mesh.n_points)
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,10 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, scattered
 from fastcontact.errors import ContactError, ConvergenceError
 from fastcontact.linear.field_compliance import FieldCompliance
+from fastcontact.linear.sparse_rows import without_zeros
 
 # Largest number of constraints whose Delassus operator is formed and factorised. A matrix with 20 000 rows occupies 3.2 GB,
 # and its factorisation takes minutes. With friction, Newton's method factorises a nonsymmetric matrix several times for each
@@ -98,10 +99,9 @@ class InverseColumns:
     def delassus(self, R: csr_array) -> Array:
         """Return ``R K^-1 R.T`` (m, m) [length / force] for a sparse matrix R (m, n)."""
         check_rows(R.shape[0])
-        nonzero = R.data != 0.0
-        column = self._positions(R.indices[nonzero])
-        starts = np.concatenate([[0], np.cumsum(nonzero)])[R.indptr]
-        rows = csr_array((R.data[nonzero], column, starts), shape=(R.shape[0], len(self._dofs)))
+        R = without_zeros(R.copy())
+        column = self._positions(R.indices)
+        rows = csr_array((R.data, column, R.indptr), shape=(R.shape[0], len(self._dofs)))
         return symmetric_part(np.asarray(rows @ (rows @ self._values).T))
 
     def put_back(self, requests: Sequence[Indices]) -> None:
@@ -147,9 +147,7 @@ def inverse_entries(n: int, solve: Callable[[Array], Array], rows: Indices, colu
     """Return the entries (m, k) of ``K^-1`` in `rows` (m,) and `columns` (k,); `solve` is called for each column."""
     entries = np.empty((len(rows), len(columns)))
     for k, column in enumerate(columns):
-        unit = np.zeros(n)
-        unit[column] = 1.0
-        entries[:, k] = solve(unit)[rows]
+        entries[:, k] = solve(scattered(1.0, column, n))[rows]
     return entries
 
 

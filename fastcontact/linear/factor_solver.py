@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, scattered
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.delassus import InverseColumns, check_rows, solve_multipliers, symmetric_part
 from fastcontact.linear.field_compliance import FieldCompliance
@@ -67,9 +67,8 @@ class KnownLoads:
 
     def put_back(self, snapshot: Sequence[Mapping[str, Any]], solve: Callable[[Array], Array]) -> None:
         """Restore the right-hand sides of a `snapshot` for the same matrix (n, n); `solve` computes missing solutions."""
-        loads = np.zeros((len(snapshot), self._loads.shape[1]))
-        for f, entry in zip(loads, snapshot, strict=True):
-            f[entry["places"]] = entry["values"]
+        n = self._loads.shape[1]
+        loads = np.array([scattered(entry["values"], entry["places"], n) for entry in snapshot]).reshape(-1, n)
         if np.array_equal(loads, self._loads):
             return
         solutions = np.empty_like(loads)

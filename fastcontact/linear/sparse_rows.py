@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, coo_array, csr_array, vstack
+from scipy.sparse import bsr_array, coo_array, csr_array, diags_array, vstack
 
-from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.arrays import AnyArray, Array, Indices, mask_at
 
 # Row numbers (n, k), column numbers (n, l) and values (n, k, l) of n dense blocks, such as the matrices of cells.
 Blocks = tuple[NDArray[np.integer], NDArray[np.integer], Array]
@@ -62,18 +62,20 @@ def rows_of(weights: csr_array, direction: Array) -> csr_array:
     values = weights.data[:, None] * direction[row]
     columns = weights.indices[:, None] * dim + np.arange(dim)
     size = (weights.shape[0], weights.shape[1] * dim)
-    rows = csr_array((values.ravel(), columns.ravel(), weights.indptr * dim), shape=size)
-    rows.eliminate_zeros()
-    return rows
+    return without_zeros(csr_array((values.ravel(), columns.ravel(), weights.indptr * dim), shape=size))
 
 
 def nodal_rows(nodes: NDArray[np.integer], values: Array, n_dofs: int) -> csr_array:
     """Return rows (m, n_dofs) with the entries `values` (m, k, dim) in the columns of `nodes` (m, k)."""
     m, k, dim = values.shape
     columns = nodes[:, :, None].astype(np.intp) * dim + np.arange(dim)
-    rows = shapes_at(values.reshape(m, k * dim), columns.reshape(m, k * dim), n_dofs)
-    rows.eliminate_zeros()
-    return rows
+    return without_zeros(shapes_at(values.reshape(m, k * dim), columns.reshape(m, k * dim), n_dofs))
+
+
+def without_zeros(matrix: csr_array) -> csr_array:
+    """Remove stored zeros from `matrix`, and return it."""
+    matrix.eliminate_zeros()
+    return matrix
 
 
 def stacked_rows(items: Sequence[Any], n_dofs: int) -> csr_array:
@@ -85,10 +87,14 @@ def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:
     """Return the matrix (m, n) with its rows multiplied by `factor` (m,); rows with a factor of zero become empty."""
     values = matrix.data * np.repeat(factor, np.diff(matrix.indptr))
     result = csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
-    if not factor.all():
-        result = result.copy()  # because `eliminate_zeros` modifies the index arrays, which `matrix` shares
-        result.eliminate_zeros()
-    return result
+    # A copy, because the removal of zeros modifies the index arrays, which `matrix` shares.
+    return result if factor.all() else without_zeros(result.copy())
+
+
+def substituted(rows: csr_array, pivots: Indices, weights: csr_array) -> csr_array:
+    """Return `rows` (m, n) after the substitution ``u[pivots] = weights @ u`` with weights (k, n)."""
+    others = rows @ diags_array(1.0 - mask_at(pivots, rows.shape[1]))
+    return csr_array(others + csr_array(rows[:, pivots]) @ weights)
 
 
 def taken(matrix: csr_array, rows: Indices) -> csr_array:

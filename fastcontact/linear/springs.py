@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.records import record
 from fastcontact.arrays import AnyArray, Indices
-from fastcontact.linear.sparse_rows import entry_rows, scaled
+from fastcontact.linear.sparse_rows import entry_rows, scaled, substituted
 
 # Largest relative difference between two sets of springs, or between the weights of eliminated unknowns, for which the same
 # preconditioner is used. With 3, "hex20" with friction takes 62 iterations (48 with 0.3; `fastcontact bench
@@ -69,15 +69,7 @@ class Springs:
 
         The rows of the result are zero in the columns of the pivots. The springs must not have a matrix `force_rows`.
         """
-        R, W, n = self.rows, weights, self.rows.shape[1]
-        number = np.full(n, -1, np.int32)
-        number[pivots] = np.arange(len(pivots))
-        column = number[R.indices]
-        is_pivot = column >= 0
-        starts = np.concatenate([[0], np.cumsum(is_pivot)])[R.indptr]
-        pivot_columns = csr_array((R.data[is_pivot], column[is_pivot], starts), shape=(R.shape[0], W.shape[0]))
-        other_columns = csr_array((R.data[~is_pivot], R.indices[~is_pivot], R.indptr - starts), shape=R.shape)
-        return Springs(csr_array(other_columns + pivot_columns @ W), self.stiffness)
+        return Springs(substituted(self.rows, pivots, weights), self.stiffness)
 
     def scaled(self, factor: float, dtype: DTypeLike = float) -> Springs:
         """Return the springs with the stiffness multiplied by `factor`, in the data type `dtype`."""

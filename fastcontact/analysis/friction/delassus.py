@@ -14,7 +14,7 @@ from scipy.linalg import block_diag
 from scipy.sparse import csc_array, csr_array, diags_array, hstack
 
 from fastcontact._tools.records import record, replace
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, mask_at
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.delassus import MAX_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded
@@ -77,9 +77,7 @@ class Delassus:
 
     def decoupled(self, selected: Indices, diagonal: Array) -> Delassus:
         """Return F with zeros in the rows and columns `selected` (q,), except for `diagonal` (q,) on the diagonal."""
-        units = np.ones(len(self.d))
-        units[selected] = 0.0
-        decoupled = self.scaled(units)
+        decoupled = self.scaled(np.where(mask_at(selected, len(self.d)), 0.0, 1.0))
         decoupled.d[selected] = diagonal
         return decoupled
 

@@ -29,7 +29,7 @@ from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction.cone_newton import Law, newton
 from fastcontact.analysis.friction.delassus import Delassus
 from fastcontact.analysis.solution import FrictionSolution
-from fastcontact.arrays import Array, Indices, Mask, largest
+from fastcontact.arrays import Array, Indices, Mask, largest, numbers_at, scattered
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, SUM_ROUND_OFF
 
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
@@ -105,10 +105,8 @@ def solve(
     jammed = elastic_slip > SINGLE_PRECISION
     settled = (best.settled or best.residual <= LENGTH_ROUND_OFF) and not jammed
     residual = max(best.residual, elastic_slip) if jammed else best.residual
-    gaps = best.gaps * scale / force_units
-    return FrictionSolution(
-        best.y * scale * force_units, gaps, best.closed, best.sticking | equality, settled, residual, iterations
-    )
+    y, gaps = best.y * scale * force_units, best.gaps * scale / force_units
+    return FrictionSolution(y, gaps, best.closed, best.sticking | equality, settled, residual, iterations)
 
 
 @dataclass(eq=False, repr=False)
@@ -190,20 +188,6 @@ class _Problem:
             else:
                 compliance, halvings = float(np.sqrt(compliance * last)), halvings + 1
         return y
-
-
-def scattered(values: Array, at: Indices, shape: tuple[int, ...]) -> Array:
-    """Return an array of a `shape` with the `values` (n,) at the positions `at` (n,), and zeros elsewhere."""
-    result = np.zeros(shape)
-    result.ravel()[at] = values
-    return result
-
-
-def numbers_at(at: Indices, shape: tuple[int, ...]) -> Indices:
-    """Return an array of a `shape` with the numbers 0 to n - 1 at the positions `at` (n,), and -1 elsewhere."""
-    result = np.full(shape, -1, np.intp)
-    result.ravel()[at] = np.arange(len(at))
-    return result
 
 
 @record

@@ -21,7 +21,6 @@ from fastcontact._tools.records import record, replace
 from fastcontact.analysis.friction import delassus, dense, eliminated
 from fastcontact.analysis.friction.cone_newton import SLIP_COMPLIANCE, Law, aligning_rotation, held_tangents, rotated
 from fastcontact.analysis.friction.delassus import Delassus
-from fastcontact.analysis.friction.dense import numbers_at, scattered
 from fastcontact.analysis.solution import (
     Accuracy,
     FrictionSolution,
@@ -32,7 +31,7 @@ from fastcontact.analysis.solution import (
     in_increments,
     response,
 )
-from fastcontact.arrays import Array, Indices, Mask, largest
+from fastcontact.arrays import Array, Indices, Mask, largest, numbers_at, scattered
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import lu_solver
@@ -301,8 +300,6 @@ def _last_increment(
     no_gaps = np.zeros((1, len(rows)))
     along_tangents = np.stack([rotated(Q, np.vstack([no_gaps, along]), back=True)[1:] for along in components])
     m, dim = constraints.positions.shape
-    vectors, all_work, all_normal = np.zeros((4, m, dim)), np.zeros(m), np.zeros(m)
+    vectors = np.zeros((4, m, dim))
     vectors[:, rows] = np.einsum("pkm,kmd->pmd", along_tangents, np.stack(constraints.directions)[:, rows])
-    all_work[rows], all_normal[rows] = work, normal
-    slip, slip_before_closing, traction, missing = vectors
-    return LastIncrement(slip, slip_before_closing, traction, missing, all_work, all_normal)
+    return LastIncrement(*vectors, scattered(work, rows, m), scattered(normal, rows, m))

@@ -11,7 +11,7 @@ import copy
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import bmat, bsr_array, csr_array, eye_array, vstack
+from scipy.sparse import block_diag, bmat, bsr_array, csr_array, eye_array, vstack
 
 from fastcontact._tools.records import record
 from fastcontact.analysis.modal.held_contact import Conditions
@@ -115,10 +115,7 @@ class Wave:
         """Return the real form of a real block matrix (n, n), with the same block size."""
         if self.is_standing:
             return K
-        n, entries = K.shape[0] // K.blocksize[0], len(K.indices)
-        data = np.concatenate([K.data, K.data])
-        indices, indptr = np.concatenate([K.indices, K.indices + n]), np.concatenate([K.indptr, entries + K.indptr[1:]])
-        return bsr_array((data, indices, indptr), shape=(2 * K.shape[0], 2 * K.shape[0]))
+        return block_diag((K, K), format="csr").tobsr(K.blocksize)
 
     def repeated(self, values: AnyArray) -> AnyArray:
         """Return values (n, ...) of nodes or displacements, repeated for the imaginary part unless the wave is standing."""

@@ -22,6 +22,7 @@ from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.multigrid.hierarchy import COARSEST_SIZE
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
+from fastcontact.linear.sparse_rows import substituted
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 UNSTABLE = (
@@ -163,8 +164,7 @@ class Reduced:
         if len(nonempty):
             pivots, weights = _pivots_and_weights(csr_array(rows_of_unknowns[nonempty]), nodes[nonempty], size)
             self.free[pivots] = False
-            at_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
-            projection = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)
+            projection = substituted(csr_array(diags_array(system.free.astype(float))), pivots, weights)
             K = csr_array(projection.T @ self.K.tocsr() @ projection).tobsr((size, size))
             K.sort_indices()
             self.K, self._T = separate_supports(K, ~self.free)[0], csr_array(self._T @ projection)

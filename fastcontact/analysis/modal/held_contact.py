@@ -13,8 +13,7 @@ from scipy.sparse import block_diag, bsr_array, csr_array, diags_array, vstack
 
 from fastcontact._tools.records import record, replace
 from fastcontact.analysis.resultants import end_of
-from fastcontact.analysis.wear import at_points
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, scattered
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
@@ -117,7 +116,7 @@ def configuration_of(step: StepResult | None, name: str, pair: Formulation) -> C
     configuration = replace(end_of(step, step, name), pressure=contact.pressure)
     if contact.wear is None:
         return configuration
-    return replace(configuration, wear_depth=at_points(contact.points, contact.wear, len(pair.points)))
+    return replace(configuration, wear_depth=scattered(contact.wear, contact.points, len(pair.points)))
 
 
 def _conditions(

@@ -152,10 +152,9 @@ class Modes(Shapes):
         return len(self.frequencies)
 
     def _step(self, number: int) -> StepResult:
-        model, u = self._model, self.shapes[number]
-        stress = recovery.nodal_stress(
-            model.mesh, model.kinematics, self._field.moduli, self._field.moduli_rows, u, self._field.treatment
-        )
+        model, field, u = self._model, self._field, self.shapes[number]
+        arguments = field.moduli, field.moduli_rows, u, field.treatment
+        stress = recovery.nodal_stress(model.mesh, model.kinematics, *arguments)
         return _mode_step(number, self.frequencies[number], u.copy(), stress, model)
 
     def whole_ring(self) -> RingModes:

@@ -22,12 +22,12 @@ from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
-from fastcontact.arrays import Array, Indices, Mask, largest
+from fastcontact.arrays import Array, Indices, Mask, largest, scattered
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import LinearisedPoints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
-from fastcontact.linear.sparse_rows import entry_rows
+from fastcontact.linear.sparse_rows import entry_rows, without_zeros
 from fastcontact.round_off import DIFFERENCE_STEP
 
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
@@ -163,8 +163,7 @@ class MovingContact:
         # where forces are.
         scale = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
         jump.data[np.abs(jump.data) <= INCREMENT * scale] = 0.0
-        jump.eliminate_zeros()
-        return jump
+        return without_zeros(jump)
 
     @cached_property
     def _moving_dofs(self) -> Indices:
@@ -211,8 +210,7 @@ class MovingContact:
         dim, n, size = self.problem.model.mesh.dim, len(self.u), len(self.sample)
         sums = [csr_array((size, n)), csr_array((size, n))]
         for dofs in groups:
-            unknowns = np.zeros(n)
-            unknowns[dofs] = 1.0
+            unknowns = scattered(1.0, dofs, n)
             for side, changed in enumerate(self._one_sided(self.problem.system.displacement(unknowns, np.zeros(n)))):
                 rows, columns = np.flatnonzero(changed), np.zeros(np.count_nonzero(changed), np.intp)
                 if len(dofs) > 1:
@@ -276,9 +274,8 @@ class MovingContact:
     @cached_property
     def _direction(self) -> Array:
         """Unknowns (n_dofs,) of a direction in which all points move [-]."""
-        direction, dofs = np.zeros(len(self.u)), self._moving_dofs
-        direction[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
-        return direction
+        dofs = self._moving_dofs
+        return scattered(np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs)), dofs, len(self.u))
 
     def _is_consistent(self, derivative: csr_array) -> bool:
         """Return whether the derivative agrees with that along a direction in which all points move."""

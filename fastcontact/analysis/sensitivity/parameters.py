@@ -13,7 +13,7 @@ from fastcontact.analysis.sensitivity.adjoint import Change
 from fastcontact.analysis.sensitivity.moving_contact import INCREMENT, MovingContact
 from fastcontact.analysis.sensitivity.quantities import Label
 from fastcontact.analysis.wear import Worn
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, scattered
 from fastcontact.elasticity.anisotropic_materials import AXIS_PAIRS, Anisotropic, Orthotropic
 from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Load
@@ -121,13 +121,12 @@ def _with_constant(material: Material, name: str, component: int | None, increme
 
 def _internal_forces(contact: MovingContact) -> Array:
     """Return the internal forces (n_dofs,) minus the equivalent forces of thermal expansion and initial states [force]."""
-    problem, force = contact.problem, np.zeros(len(contact.u))
-    model, displacement = problem.model, problem.displacement(contact.u)
+    problem, model = contact.problem, contact.problem.model
+    displacement = problem.displacement(contact.u)
     forces = model.internal_forces(displacement)
     for by_ramp in (model.thermal_forces_by_ramp(), model.initial_forces_by_ramp()):
         forces = forces - combined(by_ramp, problem.ramp, contact.instant, displacement.shape)
-    force[: model.n_dofs] = forces.ravel()
-    return force
+    return np.pad(forces.ravel(), (0, len(contact.u) - model.n_dofs))
 
 
 Item = TypeVar("Item", bound=Load | Temperature)
@@ -303,8 +302,7 @@ def _motion_derivatives(contact: MovingContact, parameter: Label) -> Change:
     motion = np.array(pair.motion) * multiplier(pair.ramp, problem.ramp, contact.instant)
     number = problem.force_driven.number(name)
     if number is not None:
-        values = np.zeros(len(contact.u))
-        values[problem.force_driven.dofs(number)] = motion
+        values = scattered(motion, problem.force_driven.dofs(number), len(contact.u))
         zero_factors = [0.0] * len(problem.model.relations)
         return replace(_zero_change(contact), lift=problem.system.lift(values, zero_factors))
 

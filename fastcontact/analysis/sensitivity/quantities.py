@@ -8,6 +8,7 @@ import numpy as np
 
 from fastcontact.analysis.sensitivity.adjoint import Gradient
 from fastcontact.analysis.sensitivity.moving_contact import INCREMENT, MovingContact
+from fastcontact.arrays import scattered
 from fastcontact.errors import ModelError, check_known
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
@@ -78,8 +79,7 @@ def _reaction(contact: MovingContact, zero: Gradient, quantity: Label) -> Gradie
     axis, points = _axis(model, quantity), model.mesh.points_of(str(quantity[1]))
     if model.springs:
         raise ModelError("reactions of a model with springs have no sensitivities: use displacements or contact forces")
-    unit_displacement = np.zeros(len(contact.u))
-    unit_displacement[points * model.mesh.dim + axis] = 1.0
+    unit_displacement = scattered(1.0, points * model.mesh.dim + axis, len(contact.u))
     balance = contact.problem.system.balance(unit_displacement)[0]
     if not balance.any():
         raise ModelError(f"no support acts along {quantity[-1]} on group '{quantity[1]}': its reaction is zero")
@@ -99,8 +99,7 @@ def _contact_force(contact: MovingContact, zero: Gradient, step: StepResult, qua
                 "single pair has no sensitivity here; use pairs that share no nodes"
             )
     dim, n = contact.problem.model.mesh.dim, len(contact.u)
-    sample = np.zeros(n + len(contact.active))
-    sample[nodes * dim + axis] = 1.0
+    sample = scattered(1.0, nodes * dim + axis, n + len(contact.active))
     rows = contact.constraints.B[contact.active]
     return replace(zero, value=float(contact_of_step.force[axis]), multiplier=rows @ sample[:n], sample=sample)
 
@@ -129,6 +128,6 @@ def _pressure(
         increased = multiplier.copy()
         increased[rows[k]] += change
         multiplier_gradient[k] = (contact.pressure(increased)[row] - pressure) / change
-    sample = np.zeros(len(contact.u) + len(rows) + len(result.points))
-    sample[len(contact.u) + len(rows) + row] = 1.0
+    first = len(contact.u) + len(rows)
+    sample = scattered(1.0, np.array([first + row]), first + len(result.points))
     return contact, replace(zero, value=float(pressure), sample=sample)

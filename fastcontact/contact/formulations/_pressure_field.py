@@ -35,7 +35,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, mask_at
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
@@ -186,9 +186,8 @@ class PressureField(NodalField):
         with_area = nodes_with_area(self.nodal_areas, [self.facet_nodes])
         nodes, shape, n = self.facet_nodes[active], self.shape[active], len(gap)
         closed = _nearest(nodes, shape, n) | _nearest(nodes, np.where(with_area[nodes], shape, -np.inf), n)
-        usable, of_active_facet = self.projection.areas > 0, np.zeros(n, bool)
-        of_active_facet[nodes] = True
-        closed |= of_active_facet & ~_nearest(self.facet_nodes[usable], self.shape[usable], n)
+        usable = self.projection.areas > 0
+        closed |= mask_at(nodes, n) & ~_nearest(self.facet_nodes[usable], self.shape[usable], n)
         closed &= pressure > 0
         # Forces at one end of a facet, opposite an edge, may cause a negative pressure at the nearest node.
         nodes_of_open_facets = nodes[~closed[nodes].any(axis=1)]
@@ -215,9 +214,8 @@ def _nearest(facet_nodes: Indices, shape: Array, n_nodes: int) -> Mask:
     `facet_nodes` (m, n) are the nodes of the facet of each point, and `shape` (m, n) their shape functions. If several shape
     functions are equally large, all of their nodes count.
     """
-    nearest = np.zeros(n_nodes, bool)
-    nearest[facet_nodes[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - LENGTH_ROUND_OFF]] = True
-    return nearest
+    largest = shape.max(axis=1, keepdims=True, initial=-np.inf)
+    return mask_at(facet_nodes[shape >= largest - LENGTH_ROUND_OFF], n_nodes)
 
 
 @dataclass(eq=False)

@@ -44,7 +44,7 @@ from fastcontact.contact.search.limits import LARGEST_OVERHANG
 from fastcontact.contact.supported_nodes import directions_without_slip, nodes_with_prescribed_gap
 from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
-from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
+from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled, without_zeros
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.round_off import DIFFERENCE_STEP, LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -423,8 +423,8 @@ class WeightedMortar(Formulation):
                 continue
             substitute = self._coverage(*coverage[:2], coverage.with_gap & ~nodes, coverage.nodal_map)
             D_substitute, M_substitute, _ = self._weighted_integrals(substitute)
-            difference = csr_array(scaled(csr_array(D_substitute - M_substitute), 1.0 / weight) - motion)
-            difference.eliminate_zeros()
+            substituted = scaled(csr_array(D_substitute - M_substitute), 1.0 / weight)
+            difference = without_zeros(csr_array(substituted - motion))
             for k, direction in enumerate(directions):
                 cosine = np.einsum("md,md->m", direction, axis)
                 rows[k] = csr_array(rows[k] + rows_of(difference, cosine[:, None] * axis))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fastcontact.arrays import Indices, Mask
+from fastcontact.arrays import Indices, Mask, mask_at
 from fastcontact.contact.projection import DeformedSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
@@ -92,9 +92,7 @@ def _border(mesh: Mesh, side: Surface, numbers: Indices) -> Mask:
     by_ridge = np.argsort(ridge, kind="stable")
     first, second = by_ridge[count[ridge[by_ridge]] == 2].reshape(-1, 2).T
     _check_orientation(mesh, side, numbers, facet[first], facet[second], sign[first] != sign[second])
-    on_border = np.zeros(len(side.points), bool)
-    on_border[nodes[count[ridge] == 1]] = True
-    return on_border
+    return mask_at(nodes[count[ridge] == 1], len(side.points))
 
 
 def _ridges(side: Surface) -> tuple[Indices, Indices, Indices]:

@@ -19,6 +19,7 @@ from fastcontact.contact.projection import (
     facets_containing,
     interpolate,
 )
+from fastcontact.elasticity.loads import solid_points
 from fastcontact.errors import ContactError
 from fastcontact.mesh.area_vectors import unit_vectors
 from fastcontact.mesh.mesh import Mesh
@@ -82,11 +83,7 @@ class MeshedSurface:
         """Raise ContactError if the surface is part of `mesh` and belongs to solid cells there."""
         if mesh.points is not self.mesh.points and not np.array_equal(mesh.points, self.mesh.points):
             return
-        solid = np.zeros(mesh.n_points, bool)
-        for cells in mesh.solids.values():
-            solid[cells] = True
-        shared = self.mesh.points_of(self.group)
-        shared = shared[solid[shared]]
+        shared = np.intersect1d(self.mesh.points_of(self.group), solid_points(mesh, None))
         if len(shared):
             raise ContactError(
                 f"points of the rigid surface '{self.group}' belong to solid cells of the model (number: {len(shared)}, "

@@ -13,7 +13,7 @@ from scipy.sparse import bsr_array, coo_array, csc_array, eye_array
 from scipy.sparse.linalg import spilu
 
 from fastcontact._jit.parallel import on_one_blas_thread
-from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.arrays import Array, Indices, Mask, Numbers, mask_at, numbers_at
 from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_kernels
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
@@ -49,9 +49,8 @@ def fill_reducing_order(K: bsr_array, last: Indices, connected: bool = False) ->
         options={"SymmetricMode": True},
     )  # fmt: skip
     order = (np.argsort(incomplete.perm_c)[:, None] * size + np.arange(size)).ravel()
-    is_last = np.zeros(len(order), bool)
-    is_last[last] = True
-    return np.concatenate([order[~is_last[order]], order[is_last[order]]])
+    is_last = np.isin(order, last)
+    return np.concatenate([order[~is_last], order[is_last]])
 
 
 def reordered(K: bsr_array, order: Indices) -> csc_array:
@@ -98,7 +97,7 @@ class SymbolicFactors:
     """
 
     def __init__(self, K: bsr_array, last: Indices, repeated: bool = False) -> None:
-        n, is_last = K.shape[0], np.zeros(K.shape[0], bool)
+        n = K.shape[0]
         self._pattern, self._last = (K.indptr, K.indices), last
         self._previous = OldFactors(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
         self._entry_numbers: csc_array | None = None
@@ -106,10 +105,9 @@ class SymbolicFactors:
         orders = [fill_reducing_order(K, last, connected) for connected in (False, True)[: 1 + repeated]]
         candidates = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
         order, self._A, self._tree = min(candidates, key=lambda entry: np.square(entry[2].entries, dtype=float).sum())
-        self._unknowns, self._position = order[self._tree.order], np.empty(n, np.intp)
-        self._position[self._unknowns] = np.arange(n)
-        is_last[self._position[last]] = True
-        self._supernodes = supernodes(self._A, self._tree, is_last)
+        self._unknowns = order[self._tree.order]
+        self._position = numbers_at(self._unknowns, n)
+        self._supernodes = supernodes(self._A, self._tree, mask_at(self._position[last], n))
         parent = self._tree.parent[self._supernodes.first[1:] - 1].astype(np.int64)
         self._parent = np.where(parent < 0, -1, np.searchsorted(self._supernodes.first, parent, side="right") - 1)
 

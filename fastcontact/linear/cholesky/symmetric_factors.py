@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotri
 
 from fastcontact._jit.parallel import on_one_blas_thread
-from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.arrays import Array, Indices, Numbers, mask_at, numbers_at, scattered
 from fastcontact.linear.cholesky import triangular_kernels
 
 # Largest number of right-hand sides for which systems are solved simultaneously. With 48, columns of K^-1 take 1.35 times as
@@ -46,8 +46,7 @@ class SymmetricFactors:
         self.n = len(d)
         self.nnz = len(L.values)
         self._L, self._d, self._position, self._last = L, d, position, last
-        self._is_last = np.zeros(self.n, bool)
-        self._is_last[position[last]] = True  # positions of the unknowns `last`
+        self._is_last = mask_at(position[last], self.n)  # positions of the unknowns `last`
 
     @property
     def nbytes(self) -> int:
@@ -83,9 +82,8 @@ class SymmetricFactors:
     def last_inverse(self) -> Array:
         """Return the block (m, m) of ``K^-1`` for the unknowns `last` (m,), in this order [length / force]."""
         positions = np.sort(self._position[self._last])
-        index, trailing = np.full(self.n, -1), np.zeros((len(positions), len(positions)))
-        index[positions] = np.arange(len(positions))
-        triangular_kernels.copy_block(*self._L, index, trailing)
+        trailing = np.zeros((len(positions), len(positions)))
+        triangular_kernels.copy_block(*self._L, numbers_at(positions, self.n), trailing)
         # The last block of L D^1/2 is the Cholesky factor of the Schur complement, whose inverse is the block of K^-1.
         inverse, _ = dpotri(trailing * np.sqrt(self._d[positions]), lower=True)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
@@ -94,7 +92,6 @@ class SymmetricFactors:
 
     def harmonic_extension(self, u: Array) -> Array:
         """Return displacements (n,) equal to u (m,) at the unknowns `last`, without forces on the other unknowns [length]."""
-        x = np.zeros(self.n)
-        x[self._position[self._last]] = u
+        x = scattered(u, self._position[self._last], self.n)
         triangular_kernels.backward(*self._L, self._is_last, x)
         return x[self._position]

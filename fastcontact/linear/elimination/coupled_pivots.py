@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, numbers_at
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
@@ -34,22 +34,22 @@ Solve = Callable[[Array], Array]
 class DependenceError(ConvergenceError):
     """Raised if constraints are linearly dependent."""
 
+    TEXT = (
+        "active contact constraints are linearly dependent, so that an iterative solver cannot eliminate them: leave out "
+        "one of two contacts on the same nodes, or use the direct solver"
+    )
+
     def __init__(self) -> None:
-        super().__init__(
-            "active contact constraints are linearly dependent, so that an iterative solver cannot eliminate them: leave out "
-            "one of two contacts on the same nodes, or use the direct solver"
-        )
+        super().__init__(self.TEXT)
 
 
 class CoupledError(DependenceError):
     """Raised if the equations of many nodes involve the same unknowns and cannot be eliminated."""
 
-    def __init__(self) -> None:
-        ConvergenceError.__init__(
-            self,
-            "active contact constraints of many nodes share unknowns, so that an iterative solver cannot eliminate them: use "
-            'multipliers="dual" or the direct solver',
-        )
+    TEXT = (
+        "active contact constraints of many nodes share unknowns, so that an iterative solver cannot eliminate them: use "
+        'multipliers="dual" or the direct solver'
+    )
 
 
 @record
@@ -136,8 +136,7 @@ def lumped_matrix(P: csr_array, pivots: Indices, size: int) -> csr_array:
     unknowns per node.
     """
     node, direction = pivots // size, pivots % size
-    column = np.full((node.max() + 1) * size, -1, np.intp)
-    column[pivots] = np.arange(len(pivots))
+    column = numbers_at(pivots, (node.max() + 1) * size)
     entries = coo_array(P)
     columns = column[node[entries.row] * size + direction[entries.col]]
     valid = columns >= 0
@@ -162,8 +161,7 @@ def block_inverse(A: csr_array) -> csr_array:
     rows, cols, values = [], [], []
     for k in np.unique(size):
         components = np.flatnonzero(size == k)
-        block_number = np.full(len(size), -1, np.intp)
-        block_number[components] = np.arange(len(components))
+        block_number = numbers_at(components, len(size))
         selected = block_number[label[entries.row]] >= 0
         row, col = entries.row[selected], entries.col[selected]
         blocks = np.zeros((len(components), k, k))

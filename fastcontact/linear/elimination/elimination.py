@@ -12,10 +12,10 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, mask_at
 from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, Inverse, SparseInverse
-from fastcontact.linear.sparse_rows import entry_rows
+from fastcontact.linear.sparse_rows import entry_rows, without_zeros
 
 NO_INVERSE = SparseInverse(csr_array((0, 0)))
 
@@ -140,15 +140,11 @@ def eliminate(
 
 def _weights(B: csr_array, pivots: Indices, inverse: Inverse) -> csr_array:
     """Return `Elimination.weights` (m, n), given the inverse of the columns of B that belong to the pivots."""
-    is_pivot = np.zeros(B.shape[1], bool)
-    is_pivot[pivots] = True
-    remainder = csr_array((np.where(is_pivot[B.indices], 0.0, -B.data), B.indices, B.indptr), shape=B.shape, copy=True)
-    remainder.eliminate_zeros()
+    values = np.where(mask_at(pivots, B.shape[1])[B.indices], 0.0, -B.data)
+    remainder = without_zeros(csr_array((values, B.indices, B.indptr), shape=B.shape, copy=True))
     return remainder if isinstance(inverse, CoupledPivots) else _sparse_weights(inverse, remainder)
 
 
 def _sparse_weights(inverse: SparseInverse, remainder: csr_array) -> csr_array:
     """Return the product (m, n) of the inverse of the pivot columns and the negative remaining columns `remainder` (m, n)."""
-    weights = csr_array(inverse.matrix @ remainder)
-    weights.sort_indices()
-    return weights
+    return csr_array(inverse.matrix @ remainder).sorted_indices()

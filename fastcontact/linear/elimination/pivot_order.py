@@ -29,7 +29,7 @@ from fastcontact.linear.elimination.coupled_pivots import (
     SparseInverse,
     block_inverse,
 )
-from fastcontact.linear.sparse_rows import entry_rows
+from fastcontact.linear.sparse_rows import entry_rows, without_zeros
 
 # Smallest ratio of a pivot to the largest entry of its equation. Without it, `test_weak_unknowns_are_no_pivots` fails.
 SMALLEST_PIVOT = 0.25
@@ -110,11 +110,10 @@ def _triangular_inverse(P: csr_array, max_block_size: int, max_terms: int) -> Sp
     label = connected_components(P, connection="strong")[1]
     if np.bincount(label).max(initial=0) > max_block_size:
         return None
-    in_diagonal_block = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
-    values = (np.where(mask, P.data, 0.0) for mask in (in_diagonal_block, ~in_diagonal_block))
-    diagonal, off_diagonal = (csr_array((data, P.indices, P.indptr), shape=P.shape, copy=True) for data in values)
-    diagonal.eliminate_zeros()
-    off_diagonal.eliminate_zeros()
+    in_diagonal_block = label[entry_rows(P)] == label[P.indices]
+    masks = in_diagonal_block, ~in_diagonal_block
+    parts = (csr_array((P.data * mask, P.indices, P.indptr), shape=P.shape, copy=True) for mask in masks)
+    diagonal, off_diagonal = map(without_zeros, parts)
     # The inverse of a block triangular matrix is a finite Neumann series.
     total = term = diagonal_inverse = block_inverse(diagonal)
     for _ in range(max_terms):

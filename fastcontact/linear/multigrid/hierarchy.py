@@ -174,10 +174,10 @@ class Hierarchy:
             self.coarse.solve(level.b, level.x)
             return
         factors = self._factors[index]
-        level.relax(level.b, *factors[0], True)
+        level.relax(level.b, *factors[0], level.d, level.x, True)
         for factor in factors[1:]:
             level.residual()
-            level.relax(level.r, *factor)
+            level.relax(level.r, *factor, level.d, level.x)
         level.residual()
         coarser = self.levels[index + 1]
         level.restrict(coarser.b)
@@ -185,7 +185,7 @@ class Hierarchy:
         level.correct(coarser.x)
         for factor in factors:
             level.residual()
-            level.relax(level.r, *factor)
+            level.relax(level.r, *factor, level.d, level.x)
 
 
 def graph(A: BlockMatrix) -> csr_matrix:

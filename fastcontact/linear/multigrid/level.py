@@ -19,7 +19,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from fastcontact._jit.parallel import NODES_PER_CELL, parallel_for
-from fastcontact.arrays import AnyArray
+from fastcontact.arrays import AnyArray, mask_at
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.matrix import BlockMatrix
@@ -105,27 +105,20 @@ class Level:
         cycle_kernels.invert_blocks(self.diagonal, len(self.A.rows), inverse_diagonal)
         return Level(self.A, self.diagonal, inverse_diagonal, self.bound, self.P, self.R)
 
-    def relax(self, r: AnyArray, step_factor: float, residual_factor: float, from_zero: bool = False) -> None:
-        """Update `x` by a Chebyshev step for the residual r (n,), and set its eliminated unknowns.
+    def relax(
+        self, r: AnyArray, step_factor: float, residual_factor: float, d: AnyArray, x: AnyArray, from_zero: bool = False
+    ) -> None:
+        """Update the iterate `x` (n,) by a Chebyshev step for the residual r (n,), and set its eliminated unknowns.
 
-        The factors, those of `chebyshev`, multiply the last step and the preconditioned residual.
+        The factors, those of `chebyshev`, multiply the last step `d` (n,), which is updated, and the preconditioned residual.
         """
-        real = r.dtype.type
-        self.chebyshev_step(r, real(step_factor), real(residual_factor), self.d, self.x, from_zero)
+        rows, factors = self.A.rows, map(r.dtype.type, (step_factor, residual_factor))
+        arguments = self.inverse_diagonal, r, *factors, d, x, rows, from_zero
+        parallel_for(cycle_kernels.relax, self.n // len(rows), NODES_PER_CELL, *arguments)
         if self.free_motions is not None:
-            self.free_motions.correct(r, residual_factor, self.d, self.x)
+            self.free_motions.correct(r, residual_factor, d, x)
         if self.eliminated is not None:
-            self.eliminated.complete(self.x)
-
-    def chebyshev_step(
-        self, r: AnyArray, step_factor: np.floating, residual_factor: np.floating, d: AnyArray, x: AnyArray, from_zero: bool,
-    ) -> None:  # fmt: skip
-        """Apply `cycle_kernels.relax` to the last step `d` (n,) and the iterate `x` (n,), in place, without corrections."""
-        rows = self.A.rows
-        parallel_for(
-            cycle_kernels.relax, self.n // len(rows), NODES_PER_CELL, self.inverse_diagonal, r, step_factor, residual_factor,
-            d, x, rows, from_zero,
-        )  # fmt: skip
+            self.eliminated.complete(x)
 
     def residual(self) -> None:
         """Fill `r` with ``b - A x``."""
@@ -176,11 +169,7 @@ class Level:
         old_alpha, beta, rz = 1.0, 0.0, 0.0
         real = r.dtype.type
         for step in range(min(LANCZOS_STEPS, self.n)):
-            self.chebyshev_step(r, real(0), real(1), scratch, z, True)
-            if self.free_motions is not None:
-                self.free_motions.correct(r, 1.0, scratch, z)
-            if self.eliminated is not None:
-                self.eliminated.complete(z)
+            self.relax(r, 0.0, 1.0, scratch, z, True)
             new_rz = float(r @ z)
             if not new_rz > ROUND_OFF * abs(rz):
                 break
@@ -255,8 +244,7 @@ class CoarseLevel:
             return
         diagonal = A.diagonal()
         self._unstiffened = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
-        active = np.ones(self.n)
-        active[self._unstiffened] = 0.0
+        active = 1.0 - mask_at(self._unstiffened, self.n)
         K = diags_array(active) @ A @ diags_array(active) + diags_array(1.0 - active)
         self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 

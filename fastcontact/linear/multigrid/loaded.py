@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._tools.records import record
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, scattered
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIterative
 from fastcontact.linear.elimination.pivot_order import DependenceError
@@ -102,8 +102,7 @@ class LoadedMultigrid(LoadedIterative):
                 start = self._at_edge
             arguments = f, elimination, springs, border, guess, start[field.edge_values] / field.scales, tolerance
             u, at_edge = solver.bordered_solution(*arguments)
-            self._at_edge = np.zeros(len(start))
-            self._at_edge[field.edge_values] = field.scales * at_edge
+            self._at_edge = scattered(field.scales * at_edge, field.edge_values, len(start))
             f = f + border.rows.T @ at_edge
         else:
             u = solver.solution(f, elimination, guess, monitor and check, tolerance, springs)

@@ -56,9 +56,7 @@ class LocalChange:
     def galerkin_product(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T change P``, the change of the next coarser matrix with the prolongator P."""
         coarse_nodes, P_rows = rows_of_prolongator(P, self.nodes)
-        product = bsr_array(P_rows.T @ self.blocks @ P_rows)
-        product.sort_indices()
-        return LocalChange(coarse_nodes, product)
+        return LocalChange(coarse_nodes, bsr_array(P_rows.T @ self.blocks @ P_rows).sorted_indices())
 
     def padded(self, nodes: Indices) -> bsr_array:
         """Return `blocks` with zero rows and columns added for `nodes` (l,), an ascending superset of the nodes."""
@@ -73,9 +71,7 @@ def sum_of_changes(change: LocalChange, *others: LocalChange) -> LocalChange:
     """Return the sum of several changes of the same matrix."""
     for other in others:
         nodes = np.union1d(change.nodes, other.nodes)
-        total = bsr_array(change.padded(nodes) + other.padded(nodes))
-        total.sort_indices()
-        change = LocalChange(nodes, total)
+        change = LocalChange(nodes, bsr_array(change.padded(nodes) + other.padded(nodes)).sorted_indices())
     return change
 
 
@@ -150,6 +146,4 @@ class SymmetricChange:
         dofs = (nodes[:, None] * self.size + np.arange(self.size)).ravel()
         DP, GP = (rows[:, dofs].tobsr((1, self.size)) @ P_rows for rows in (self.D, self.G))
         half = bsr_array(DP.T @ GP)
-        total = bsr_array(half + half.T)
-        total.sort_indices()
-        return LocalChange(coarse_nodes, total)
+        return LocalChange(coarse_nodes, bsr_array(half + half.T).sorted_indices())

@@ -19,6 +19,7 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.sparse_rows import substituted
 from fastcontact.round_off import SINGLE_PRECISION
 
 
@@ -117,9 +118,5 @@ def compose(elimination: Elimination, followers: Elimination) -> tuple[Indices, 
     weights : csr_array (m + q, n)
         Weights of all n unknowns in these values [-].
     """
-    T, S = elimination.weights, followers.weights
-    T_of_followers = csr_array(T[:, followers.pivots])
-    free = np.ones(T.shape[1])
-    free[followers.pivots] = 0.0
-    pivots = np.concatenate([elimination.pivots, followers.pivots])
-    return pivots, csr_array(vstack([T @ diags_array(free) + T_of_followers @ S, S], format="csr"))
+    pivots, S = np.concatenate([elimination.pivots, followers.pivots]), followers.weights
+    return pivots, csr_array(vstack([substituted(elimination.weights, followers.pivots, S), S], format="csr"))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, mask_at, numbers_at
 from fastcontact.linear.cholesky.factorisation import fill_reducing_order, singular_matrix_error
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 from fastcontact.linear.factor_solver import FactorSolver
@@ -28,8 +28,7 @@ class Cholmod(FactorSolver):
 
         factor = factorise(lower_triangle(K.tocsr()), matrix(fill_reducing_order(K, last)))  # K is symmetric
         # CHOLMOD may reorder independent branches of the elimination tree, which does not affect the factors.
-        position = np.empty(self.n, np.intp)
-        position[_elimination_order(factor, self.n)] = np.arange(self.n)
+        position = numbers_at(_elimination_order(factor, self.n), self.n)
         start, rows, values = (np.asarray(array).ravel() for array in cholmod.getfactor(factor).CCS)
         diagonal = values[start[:-1]]
         values /= np.repeat(diagonal, np.diff(start))
@@ -49,8 +48,7 @@ def grouped_by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], val
     previous = np.flatnonzero(in_supernode) - 1
     in_supernode[1 + previous] = rows[start[previous] + 1] == previous + 1
     first = np.append(np.flatnonzero(~in_supernode), len(entries))
-    last = np.zeros(len(entries), bool)
-    last[first[1:] - 1] = True
+    last = mask_at(first[1:] - 1, len(entries))
     shared = np.repeat(last, entries)
     shared[start[:-1]] = False
     row_start = np.concatenate([[0], np.cumsum(entries[last] - 1)])

@@ -11,16 +11,17 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, bsr_matrix, csr_array, diags_array, eye_array
+from scipy.sparse import bsr_array, bsr_matrix, diags_array, eye_array
 from scipy.sparse.linalg import cg
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, mask_at, scattered
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIterative, restore_tolerance, tighten
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
 from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
+from fastcontact.linear.sparse_rows import substituted
 
 # As in "amg", all connections are treated as strong. The near-nullspace candidates are not improved, because rigid-body modes
 # need no improvement. The smoother is the one with the shortest solution time.
@@ -70,10 +71,8 @@ class Pyamg(LinearSolver):
         n = self.K.shape[0]
         self._elimination, self._T, A, modes = elimination, eye_array(n, format="csr"), self.K, self._modes
         if elimination is not None:
-            pivots, free = elimination.pivots, np.ones(n)
-            free[pivots] = 0.0
-            rows_of_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
-            self._T = csr_array(diags_array(free) + rows_of_pivots @ elimination.full_weights())
+            free = 1.0 - mask_at(elimination.pivots, n)
+            self._T = substituted(self._T, elimination.pivots, elimination.full_weights())
             A = self._T.T @ self.K @ self._T + diags_array((1.0 - free) * self.K.diagonal())
             modes = free[:, None] * modes
         self._A = bsr_matrix(A.tobsr(self.K.blocksize))
@@ -96,9 +95,7 @@ class Pyamg(LinearSolver):
         """
         if elimination is not self._elimination:
             self._constrain(elimination)
-        t = np.zeros(len(f))
-        if elimination is not None:
-            t[elimination.pivots] = elimination.offset
+        t = np.zeros(len(f)) if elimination is None else scattered(elimination.offset, elimination.pivots, len(f))
         rhs = self._T.T @ (f - self.K @ t)
         v0 = None if guess is None else guess - t
         if v0 is not None and elimination is not None:
