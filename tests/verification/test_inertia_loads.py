@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from models import made_of, supported
+from scipy.integrate import quad
 
 import fastcontact as fc
 
@@ -11,18 +12,15 @@ pytestmark = pytest.mark.pairwise
 E, NU, RHO = 210e3, 0.3, 7.85e-9
 
 
-def block(kinematics, size=(2.0, 3.0), element="quad8", origin=(0.0, 0.0), density=RHO):
-    return made_of(
-        fc.generate.block(size, (8, 3), element, origin=origin), kinematics, fc.LinearElastic(E, NU, density=density)
-    )
+def block(kinematics, size=(2.0, 3.0), origin=(0.0, 0.0), nu=NU, density=RHO):
+    mesh = fc.generate.block(size, (8, 3), "quad8", origin=origin)
+    return made_of(mesh, kinematics, fc.LinearElastic(E, nu, density=density))
 
 
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
 def test_a_hanging_body_carries_its_weight(kinematics):
     """The mean stress falls linearly from the top; at nu = 0 it is exact everywhere."""
-    model = block(kinematics)
-    model.materials[0] = (fc.LinearElastic(E, 0.0, density=RHO), None)
-    supported(model, TOP="y", LEFT="x")
+    model = supported(block(kinematics, nu=0.0), TOP="y", LEFT="x")
     model.add_gravity(y=-9810.0)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     volume = np.pi * 2.0**2 * 3.0 if kinematics == "axisymmetric" else 6.0
@@ -32,10 +30,8 @@ def test_a_hanging_body_carries_its_weight(kinematics):
 
 def test_gravity_acts_on_its_groups_with_their_own_densities_and_history():
     mesh = fc.generate.box((2.0, 1.0, 1.0), (2, 1, 1), "hex8").with_groups(cells={"HEAVY": [0], "LIGHT": [1]})
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E, NU, density=3.0), "HEAVY")
-    model.add_material(fc.Orthotropic((E,) * 3, (NU,) * 3, (E,) * 3, density=1.0), "LIGHT")
-    model.fix("XMIN", "xyz")
+    light = fc.Orthotropic((E,) * 3, (NU,) * 3, (E,) * 3, density=1.0)
+    model = made_of(mesh, "3d", {"HEAVY": fc.LinearElastic(E, NU, density=3.0), "LIGHT": light}, XMIN="xyz")
     model.add_gravity(x=1.0, z=-10.0)
     model.add_gravity("LIGHT", y=5.0, ramp=[(0.0, 2.0), (1.0, 2.0)])
     total = [force.sum(axis=0) for force in model.forces_by_ramp().values()]
@@ -54,9 +50,8 @@ def disc(r, a, b, speed, nu=NU):
 def test_a_rotating_disc():
     mesh = fc.generate.block((40.0, np.pi / 2), (24, 20), "quad8", origin=(10.0, 0.0))
     r, t = mesh.points.T
-    model = fc.Model(mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)])), "plane_stress")
-    model.add_material(fc.LinearElastic(E, NU, density=RHO))
-    supported(model, BOTTOM="y", TOP="x")
+    mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)]))
+    model = made_of(mesh, "plane_stress", fc.LinearElastic(E, NU, density=RHO), BOTTOM="y", TOP="x")
     model.add_centrifugal(1000.0)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     radial, hoop = disc(r, 10.0, 50.0, 1000.0)
@@ -67,8 +62,7 @@ def test_a_rotating_disc():
 
 def test_a_rotating_cylinder_that_cannot_lengthen():
     """In axisymmetry, plane strain along the axis: the disc with E / (1 - nu^2) and nu / (1 - nu)."""
-    model = block("axisymmetric", (40.0, 1.0), origin=(10.0, 0.0))
-    supported(model, TOP="y", BOTTOM="y")
+    model = supported(block("axisymmetric", (40.0, 1.0), origin=(10.0, 0.0)), TOP="y", BOTTOM="y")
     model.add_centrifugal(1000.0)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     r, nu = model.mesh.points[:, 0], NU / (1 - NU)
@@ -76,14 +70,51 @@ def test_a_rotating_cylinder_that_cannot_lengthen():
     np.testing.assert_allclose(step.displacement[:, 0], r * (1 - NU**2) / E * (hoop - nu * radial), rtol=5e-3)
 
 
-def test_the_axis_may_lie_anywhere_in_space():
-    """The force on a body is that on its mass at its centre."""
-    model = made_of(fc.generate.box((2.0, 1.0, 1.0), (3, 2, 2), "hex8"), "3d", fc.LinearElastic(E, NU, density=2.0))
-    model.add_centrifugal(3.0, origin=(5.0, 1.0, -2.0), direction=(1.0, 2.0, 3.0))
+@pytest.mark.parametrize("strain", ["small", "finite"])
+def test_the_axis_may_lie_anywhere_in_space(strain):
+    """The force on a body is that on its mass at its centre, with finite strains at the centre of the deformed body."""
+    box = fc.generate.box((2.0, 1.0, 1.0), (4, 1, 1), "hex8").with_groups(cells={"HEAVY": [0, 1], "OTHER": [2, 3]})
+    laws = {"HEAVY": fc.LinearElastic(1e4, NU, density=2.0), "OTHER": fc.LinearElastic(1e4, NU)}
+    model = made_of(box, "3d", laws, strain, XMIN="xyz")
+    model.add_centrifugal(2.0, "HEAVY", origin=(5.0, 1.0, -2.0), direction=(1.0, 2.0, 3.0))
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    positions = box.points + step.displacement * (strain == "finite")
     along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
-    arm = np.array([1.0, 0.5, 0.5]) - (5.0, 1.0, -2.0)
-    expected = 4.0 * 9.0 * (arm - (arm @ along) * along)
-    np.testing.assert_allclose(next(iter(model.forces_by_ramp().values())).sum(axis=0), expected, rtol=1e-12)
+    arm = positions[box.cells["hex8"][:2]].mean(axis=(0, 1)) - (5.0, 1.0, -2.0)
+    np.testing.assert_allclose(-step.reaction.sum(axis=0), 2.0 * 4.0 * (arm - (arm @ along) * along), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kinematics", "direction"), [("plane_stress", (0, 0, 1)), ("plane_strain", (0, -2, 0)), ("3d", (0, 1, 1))]
+)
+def test_a_bar_is_stretched_by_its_rotation(kinematics, direction):
+    """At the deformed position x, ``(s - 1) (3 s + 1) E = 4 Omega^2 (length^2 - x^2)`` holds for the squared stretch s."""
+    flat = kinematics != "3d"
+    mesh = (
+        fc.generate.block((10.0, 1.0), (20, 1), "quad8") if flat else fc.generate.box((10, 1, 1), (20, 1, 1), "hex20")
+    )
+    held = {"LEFT": "x", "BLOCK": "y"} if flat else {"XMIN": "x", "BOX": "yz"}
+    model = made_of(mesh, kinematics, fc.LinearElastic(1000.0, 0.0, density=1.0), "finite", **held)
+    model.add_centrifugal(2.0, direction=direction)
+    model.add_centrifugal(2.0, direction=direction, ramp=[(0.0, 0.0), (1.0, 0.25)])
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    length = 10.0 + step.displacement[mesh.points_of("RIGHT" if flat else "XMAX"), 0].mean()
+    assert length == pytest.approx(11.5316, abs=1e-4)
+    undeformed = quad(lambda x: ((1.0 + np.sqrt(4.0 + 0.06 * (length**2 - x**2))) / 3.0) ** -0.5, 0.0, length)[0]
+    assert undeformed == pytest.approx(10.0, rel=1e-8)
+    changes = [entry["displacement_change"] for entry in step.iterations["history"]]
+    assert len(changes) <= 6
+    assert changes[-2] <= 5.0 * changes[-3] ** 2
+
+
+def test_a_ring_is_widened_by_its_rotation_and_vibrates():
+    """A thin ring: ``E (s - 1) = 2 density Omega^2 R^2`` and ``E (3 s - 1) / 2 R^2 - density Omega^2`` with s as above."""
+    mesh = fc.generate.block((1e-3, 1e-3), (1, 1), "quad8", origin=(0.9995, 0.0))
+    model = made_of(mesh, "axisymmetric", fc.LinearElastic(1000.0, 0.0, density=1.0), "finite", BOTTOM="y")
+    model.add_centrifugal(np.sqrt(200.0))
+    step = fc.solve(model, fc.linear_ramp(2))[-1]
+    assert 1.0 + step.displacement[:, 0].mean() == pytest.approx(np.sqrt(1.4), rel=1e-7)
+    assert fc.modes(model, step, 1).eigenvalues[0] == pytest.approx(1600.0 - 200.0, rel=1e-6)
 
 
 def test_oblique_axes_are_refused_in_the_plane():
