@@ -70,63 +70,41 @@ def test_a_rotating_cylinder_that_cannot_lengthen():
     np.testing.assert_allclose(step.displacement[:, 0], r * (1 - NU**2) / E * (hoop - nu * radial), rtol=5e-3)
 
 
-@pytest.mark.parametrize("strain", ["small", "finite"])
-def test_the_axis_may_lie_anywhere_in_space(strain):
+def test_the_axis_may_lie_anywhere_in_space():
     """The force on a body is that on its mass at its centre, with finite strains at the centre of the deformed body."""
     box = fc.generate.box((2.0, 1.0, 1.0), (4, 1, 1), "hex8").with_groups(cells={"HEAVY": [0, 1], "OTHER": [2, 3]})
     laws = {"HEAVY": fc.LinearElastic(1e4, NU, density=2.0), "OTHER": fc.LinearElastic(1e4, NU)}
-    model = made_of(box, "3d", laws, strain, XMIN="xyz")
+    model = made_of(box, "3d", laws, "finite", XMIN="xyz")
     model.add_centrifugal(2.0, "HEAVY", origin=(5.0, 1.0, -2.0), direction=(1.0, 2.0, 3.0))
-    step = fc.solve(model, fc.linear_ramp(1))[-1]
-    positions = box.points + step.displacement * (strain == "finite")
-    along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
-    arm = positions[box.cells["hex8"][:2]].mean(axis=(0, 1)) - (5.0, 1.0, -2.0)
-    np.testing.assert_allclose(-step.reaction.sum(axis=0), 2.0 * 4.0 * (arm - (arm @ along) * along), rtol=1e-9)
+    step, along = fc.solve(model, 1)[-1], np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+    for u, force in ((0.0, model.forces_by_ramp()[None]), (step.displacement, -step.reaction)):
+        arm = (box.points + u)[box.cells["hex8"][:2]].mean(axis=(0, 1)) - (5.0, 1.0, -2.0)
+        np.testing.assert_allclose(force.sum(axis=0), 2.0 * 4.0 * (arm - (arm @ along) * along), rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("kinematics", "direction"), [("plane_stress", (0, 0, 1)), ("plane_strain", (0, -2, 0)), ("3d", (0, 1, 1))]
-)
+@pytest.mark.parametrize(("kinematics", "direction"), [("plane_stress", (0, 0, 1)), ("plane_strain", (0, -2, 0))])
 def test_a_bar_is_stretched_by_its_rotation(kinematics, direction):
     """At the deformed position x, ``(s - 1) (3 s + 1) E = 4 Omega^2 (length^2 - x^2)`` holds for the squared stretch s."""
-    flat = kinematics != "3d"
-    mesh = (
-        fc.generate.block((10.0, 1.0), (20, 1), "quad8") if flat else fc.generate.box((10, 1, 1), (20, 1, 1), "hex20")
-    )
-    held = {"LEFT": "x", "BLOCK": "y"} if flat else {"XMIN": "x", "BOX": "yz"}
-    model = made_of(mesh, kinematics, fc.LinearElastic(1000.0, 0.0, density=1.0), "finite", **held)
-    model.add_centrifugal(2.0, direction=direction)
-    model.add_centrifugal(2.0, direction=direction, ramp=[(0.0, 0.0), (1.0, 0.25)])
-    step = fc.solve(model, fc.linear_ramp(1))[-1]
-    length = 10.0 + step.displacement[mesh.points_of("RIGHT" if flat else "XMAX"), 0].mean()
-    assert length == pytest.approx(11.5316, abs=1e-4)
+    mesh, law = fc.generate.block((10.0, 1.0), (20, 1), "quad8"), fc.LinearElastic(1000.0, 0.0, density=1.0)
+    model = made_of(mesh, kinematics, law, "finite", LEFT="x", BLOCK="y")
+    for ramp in (None, [(0.0, 0.0), (1.0, 0.25)]):
+        model.add_centrifugal(2.0, direction=direction, ramp=ramp)
+    step = fc.solve(model, 1)[-1]
+    length = 10.0 + step.displacement[mesh.points_of("RIGHT"), 0].mean()
     undeformed = quad(lambda x: ((1.0 + np.sqrt(4.0 + 0.06 * (length**2 - x**2))) / 3.0) ** -0.5, 0.0, length)[0]
     assert undeformed == pytest.approx(10.0, rel=1e-8)
     changes = [entry["displacement_change"] for entry in step.iterations["history"]]
-    assert len(changes) <= 6
     assert changes[-2] <= 5.0 * changes[-3] ** 2
 
 
-def test_a_ring_is_widened_by_its_rotation_and_vibrates():
-    """A thin ring: ``E (s - 1) = 2 density Omega^2 R^2`` and ``E (3 s - 1) / 2 R^2 - density Omega^2`` with s as above."""
-    mesh = fc.generate.block((1e-3, 1e-3), (1, 1), "quad8", origin=(0.9995, 0.0))
-    model = made_of(mesh, "axisymmetric", fc.LinearElastic(1000.0, 0.0, density=1.0), "finite", BOTTOM="y")
-    model.add_centrifugal(np.sqrt(200.0))
-    step = fc.solve(model, fc.linear_ramp(2))[-1]
-    assert 1.0 + step.displacement[:, 0].mean() == pytest.approx(np.sqrt(1.4), rel=1e-7)
-    assert fc.modes(model, step, 1).eigenvalues[0] == pytest.approx(1600.0 - 200.0, rel=1e-6)
-
-
 def test_oblique_axes_are_refused_in_the_plane():
-    with pytest.raises(fc.ModelError, match="must lie in the plane or be normal"):
-        block("plane_strain").add_centrifugal(1.0, direction=(1, 0, 1))
-    with pytest.raises(fc.ModelError, match="outside the plane"):
-        block("plane_strain").add_centrifugal(1.0, origin=(0, 0, 1), direction=(1, 0, 0))
+    for origin, message in ((0, 0, 0), "must lie in the plane or be normal"), ((0, 0, 1), "outside the plane"):
+        with pytest.raises(fc.ModelError, match=message):
+            block("plane_strain").add_centrifugal(1.0, origin=origin, direction=(1, 0, 1 - origin[2]))
 
 
 def test_a_missing_density_is_told_before_any_numerics():
-    model = block("plane_strain", density=None)
-    model.fix("TOP", "xy")
+    model = supported(block("plane_strain", density=None), TOP="xy")
     model.add_gravity(y=-1.0)
     with pytest.raises(fc.ModelError, match="gravity on all solid cells needs densities, but the materials of 24"):
         model.check()
