@@ -70,9 +70,9 @@ class SpringForces(Term):
 
 
 class FollowingForce(Term):
-    """Change of the force of a pressure that follows the deformed surface; its constant part is included elsewhere.
+    """Change of a force that depends on the displacements; its constant part is included elsewhere.
 
-    For a load, the external forces of the step include the force on the undeformed surface. For a fluid between contact
+    For a load, the external forces of the step include the force on the undeformed bodies. For a fluid between contact
     surfaces, the linearised contact problem includes the force at the displacements about which it is linearised. The term,
     an internal force, is therefore the force at these displacements, `at`, minus that at the current displacements.
 
@@ -123,8 +123,8 @@ class Terms:
         self._tangent_passed_at: Array | None = None  # where the caller may have modified the tangent
         springs, n = problem.model.springs, problem.model.n_dofs
         self._others: list[Term] = [SpringForces(springs, n)] if springs else []
-        for (pressure, _), factor in zip(problem.following, load.following, strict=True):
-            force, tangent = (lambda u, index=index, at=pressure.at: at(u)[index] for index in (0, 1))
+        for (following, _), factor in zip(problem.following, load.following, strict=True):
+            force, tangent = (lambda u, index=index, at=following.at: at(u)[index] for index in (0, 1))
             self._others.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
 
     def bodies_at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:

@@ -20,7 +20,6 @@ from fastcontact.analysis.stages import stage_of
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.elasticity.constrained_system import System
-from fastcontact.elasticity.inertia_loads import Centrifugal, Densities
 from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -155,9 +154,12 @@ class _Vibration:
         cls, model: Model, sectors: Sectors, stressed: StepResult | None, step: StepResult | None, hold_sliding: bool
     ) -> _Vibration:
         """Return the vibration about a step, open at the ends of sectors; the stresses of `stressed` add stiffness."""
-        density = Densities([material for material, _ in model.materials], model.material_of_cells())
         field = model.material_field()
-        K, M = _stiffness(model, stressed, field, density), mass(model.mesh, model.kinematics, density)
+        K, M = _stiffness(model, stressed, field), mass(model.mesh, model.kinematics, model.densities())
+        if not M.data.any():
+            raise ModelError(
+                "all densities are zero, and a massless model has no modes: give the materials density=..."
+            )
         supported, _ = model.prescribed_by_ramp()
         model = open_sector(model, sectors)
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
@@ -211,7 +213,7 @@ class _Vibration:
         return (values, vectors) if wave.is_standing else complex_eigenpairs(vectors, K, M, n)
 
 
-def _stiffness(model: Model, step: StepResult | None, field: MaterialField, density: Densities) -> bsr_array:
+def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> bsr_array:
     """Return the stiffness (n_dofs, n_dofs) of cells and springs, with that of the stresses and loads of a step.
 
     Its unit is [force / length].
@@ -239,12 +241,8 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
         offset = model.stress_offset(temperature, initial, field, step.temperature)
         stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)
         K = sum_of_blocks(K, stress_stiffness(mesh, stresses, field.moduli_rows, kinematics == "axisymmetric"))
-    for factor, (pressure, _) in zip(pressures, model.following_pressures()):
-        K = sum_of_blocks(K, factor * pressure.at(deformation)[1])
-    for factor, load in zip(spins, [load for load in model.loads if isinstance(load, Centrifugal)]):
-        rotating = mass(mesh, kinematics, density, load.groups)
-        rotating.data = -factor * rotating.data @ load.gradient(mesh.dim)
-        K = sum_of_blocks(K, rotating)
+    for factor, (following, _) in zip([*pressures, *spins], model.following_loads()):
+        K = sum_of_blocks(K, factor * following.at(deformation)[1])
     return K
 
 

@@ -24,7 +24,7 @@ from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.constrained_system import System
-from fastcontact.elasticity.following_pressure import FollowerPressure
+from fastcontact.elasticity.following_loads import FollowerLoad
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.material_field import MaterialField
@@ -74,7 +74,7 @@ class StepLoad:
     angles : dict of str to float
         Rotation angle of each rigid obstacle that rotates, by the name of its contact pair [radian].
     following : tuple of float
-        Factor of each follower pressure [-].
+        Factor of each load that depends on the displacements [-].
     friction_factors : dict of str to float
         Factor of the coefficient of friction of each contact pair whose coefficient varies [-].
     fluids : dict of str to float
@@ -133,8 +133,8 @@ class Problem:
     bodies : NonlinearBodies, optional
         The solid cells, if they are nonlinear. `system` and `solver` then hold the tangent at zero displacements, or at
         `linearised_at`.
-    following : sequence of (FollowerPressure, ramp table)
-        Follower pressures. `forces` include their forces on the undeformed surface.
+    following : sequence of (FollowerLoad, ramp table)
+        Loads that depend on the displacements. `forces` include their forces on the undeformed bodies.
     heat : Heat, optional
         Heat conduction, if the model has any.
     linearised_at : ndarray (n_dofs,), optional
@@ -158,7 +158,7 @@ class Problem:
     initial_snapshot: Mapping[str, Any]
     warnings: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
-    following: Sequence[tuple[FollowerPressure, Table | None]] = ()
+    following: Sequence[tuple[FollowerLoad, Table | None]] = ()
     heat: Heat | None = None
     linearised_at: Array | None = None
 
@@ -370,7 +370,7 @@ def prepare(
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, floating, dofs, contact_dofs, driven,
         driven.prescribed(prescribed), driven.forces(forces), solver.snapshot(), tuple(warnings),
-        model.nonlinear_bodies(field), model.following_pressures() if model.strain == "finite" else [],
+        model.nonlinear_bodies(field), model.following_loads() if model.strain == "finite" else [],
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
 

@@ -26,7 +26,7 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField, groups: Sequence[st
     """Return the consistent mass matrix (n_dofs, n_dofs) [mass] of groups of solid cells, or of all solid cells.
 
     In axisymmetry, it refers to the full circle. Integrals are exact on straight cells with constant density. Raises
-    ModelError if cells have no density, or if all densities are zero.
+    ModelError if these cells have no density.
     """
     missing, selected = 0, solid_rows(mesh, groups)
 
@@ -36,8 +36,8 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField, groups: Sequence[st
         xi, weights = integration_rule(element)
         N, coordinates = element.shape(xi), mesh.points[mesh.cells[name][rows]]
         rho = density.at(name, rows, N)
+        rho[~np.isin(rows, selected.get(name, ()))] = 0.0
         missing += int(np.isnan(rho).any(axis=1).sum())
-        rho *= np.isin(rows, selected.get(name, ()))[:, None]
         volume = cell_volumes(coordinates, N, element.gradient(xi), kinematics == "axisymmetric") * weights
         return np.einsum("cq,qa,qb->cab", rho * volume, N, N, optimize=True)[..., None]
 
@@ -47,8 +47,6 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField, groups: Sequence[st
             f"modes need densities, but the materials of {missing} solid cells have none: give them density=..., 0.0 for a "
             "body without mass"
         )
-    if groups is None and not matrix.data.any():
-        raise ModelError("all densities are zero, and a massless model has no modes: give the materials density=...")
     return matrix
 
 

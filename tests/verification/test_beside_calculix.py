@@ -245,12 +245,12 @@ def on_faces(text, surface, letter, values):
     ("load", "nlgeom"),
     [
         ("*DSLOAD\nS_XMAX, P, -50.\n", ", NLGEOM"),
-        ("*CLOAD\nXMAX, 1, 70.\n", ", NLGEOM"),
-        ("*CLOAD\nXMAX, 1, 70.\n", ""),
+        *(("*CLOAD\nXMAX, 1, 70.\n", nlgeom) for nlgeom in (", NLGEOM", "")),
+        *(("*DLOAD\nBOX, CENTRIF, 4.E6, -9., 2., 1.5, 0., 0., 1.\n", nlgeom) for nlgeom in (", NLGEOM", "")),
     ],
 )
 def test_frequencies_of_a_loaded_bar(load, nlgeom, tmp_path):
-    """A pull that follows the end of the bar lowers its first frequency, one that keeps its direction raises it."""
+    """A pull that follows the end of the bar lowers its first frequency, other loads raise it."""
     mesh = fc.generate.box((60.0, 4.0, 3.0), (8, 1, 1), "hex20")
     text = deck_of(mesh, ["BOX"], ["XMIN", "XMAX"], ["XMAX"]) + MATERIAL + BLOCK.format("BOX")
     text += f"*BOUNDARY\nXMIN, 1, 3\n*STEP{nlgeom}\n*STATIC\n{load}*END STEP\n"

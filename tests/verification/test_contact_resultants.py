@@ -428,8 +428,7 @@ def test_the_wear_of_a_node_that_opens_under_friction_ends_a_step(formulation, c
     mesh = block((2.0, 1.0), (8, 4), origin=(-1.0, 0.0))
     for name, sign in (("SLOW", -1.0), ("FAST", 1.0)):
         mesh = mesh.with_facet_group(name, lambda x, s=sign: (x[:, 1] < 1e-9) & (s * x[:, 0] > -1e-9))
-    model = elastic_model(mesh, "plane_stress", TOP="x")
-    model.prescribe("TOP", y=-0.01, ramp=PRESS)
+    model = elastic_model(mesh, "plane_stress", TOP={"x": 0.0, "y": -0.01, "ramp": PRESS})
     floor, coefficients = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)), {"SLOW": 1e-3 / 3.0, "FAST": 1e-3}
     for name, k in coefficients.items():
         options = {"motion": {"x": 0.6}, "ramp": SLIDE, "friction": 0.1, "formulation": formulation, "wear": k}

@@ -337,7 +337,7 @@ def test_pressure_follows_the_wall_of_a_tube(element: str, count: int) -> None:
     ("kinematics", "element"), [("plane_strain", "quad8"), ("axisymmetric", "tri6"), ("3d", "hex8"), ("3d", "tet10")]
 )
 def test_following_pressure_is_the_derivative_of_a_volume(kinematics: str, element: str) -> None:
-    from fastcontact.elasticity.following_pressure import FollowerPressure
+    from fastcontact.elasticity.following_loads import FollowerPressure
     from fastcontact.elasticity.loads import Pressure
 
     if kinematics == "3d":

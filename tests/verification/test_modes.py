@@ -73,8 +73,7 @@ def test_a_cantilever(element):
     """Euler and Bernoulli: ``f = 1.8751^2 / (2 pi L^2) sqrt(E I / (density A))``, slender enough for 1e-3 and 6e-3."""
     flat = element in FLAT
     mesh = block((1.0, 0.02), (40, 1), element) if flat else box((1.0, 0.02, 0.02), (25, 1, 1), element)
-    model = model_of(mesh, "plane_stress" if flat else "3d")
-    model.fix("LEFT" if flat else "XMIN", "xyz"[: mesh.dim])
+    model = model_of(mesh, "plane_stress" if flat else "3d", **{"LEFT" if flat else "XMIN": "xyz"[: mesh.dim]})
     exact = np.array([1.875104, 4.694091]) ** 2 / (2 * np.pi) * 0.02 / np.sqrt(12.0)
     found = fc.modes(model, n=2 if flat else 4).frequencies
     found = found if flat else found[::2]  # two directions
@@ -102,6 +101,12 @@ def test_a_clamped_disc_and_a_ring():
     ring.add_traction("LEFT", x=0.001 / 0.995)
     (step,) = fc.solve(ring, 1)
     assert fc.modes(ring, step, 1).frequencies[0] == pytest.approx(np.sqrt(1.1) / (2 * np.pi), rel=2e-3)
+    # Fast rotation: E (s - 1) = 2 density Omega^2 R^2 for the squared stretch s; E (3 s - 1) / 2 is the tangent stiffness.
+    spun = model_of(ring.mesh, "axisymmetric", strain="finite", BOTTOM="y")
+    spun.add_centrifugal(np.sqrt(0.2))
+    (step,) = fc.solve(spun, 1)
+    assert 1.0 + step.displacement[:, 0].mean() == pytest.approx(np.sqrt(1.4), rel=1e-5)
+    assert fc.modes(spun, step, 1).eigenvalues[0] == pytest.approx(1.6 - 0.2, rel=1e-4)
 
 
 def test_a_rotating_beam_is_softer_in_the_plane_of_rotation():
@@ -515,8 +520,7 @@ def pressed_column(divisions):
 
 def yielded_bar(load, law, strain="small"):
     """A bar under tension, whose material yields at 5, and its step."""
-    model = fc.Model(block((4.0, 1.0), (8, 2), "quad8"), "plane_stress", strain=strain)
-    model.add_material(law)
+    model = made_of(block((4.0, 1.0), (8, 2), "quad8"), "plane_stress", law, strain=strain)
     supported(model, LEFT="x", BOTTOM="y")
     model.add_traction("RIGHT", x=load)
     return model, fc.solve(model, 1)[0]

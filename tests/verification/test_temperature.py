@@ -112,14 +112,8 @@ def test_a_bimetal_strip():
     below = strip.points[strip.cells["quad8"]].mean(axis=1)[:, 1] < lower
     numbers = np.arange(len(below)) + strip.offsets["quad8"]
     mesh = strip.with_groups(cells={"LOWER": numbers[below], "UPPER": numbers[~below]})
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(stiffer * E, NU, expansion=3.0 * ALPHA), "LOWER")
-    model.add_material(STEEL, "UPPER")
-    model.fix("LEFT", "x")
-    corner = int(np.abs(mesh.points).sum(axis=1).argmin())
-    held = fc.Model(mesh.with_groups(points={"CORNER": [corner]}), "plane_stress")
-    held.materials, held.supports = model.materials, model.supports
-    held.fix("CORNER", "y")
+    laws = {"LOWER": fc.LinearElastic(stiffer * E, NU, expansion=3.0 * ALPHA), "UPPER": STEEL}
+    held = made_of(mesh, "plane_stress", laws, LEFT="x", BOTTOM_LEFT="y")
     held.add_temperature(RISE)
     step = solved(held)
     heights = [

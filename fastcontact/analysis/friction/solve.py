@@ -302,4 +302,6 @@ def _last_increment(
     m, dim = constraints.positions.shape
     vectors = np.zeros((4, m, dim))
     vectors[:, rows] = np.einsum("pkm,kmd->pmd", along_tangents, np.stack(constraints.directions)[:, rows])
-    return LastIncrement(*vectors, scattered(work, rows, m), scattered(normal, rows, m))
+    slip, slip_before_closing, traction, missing = vectors
+    of_constraints = (scattered(values, rows, m) for values in (work, normal))
+    return LastIncrement(slip, slip_before_closing, traction, missing, *of_constraints)

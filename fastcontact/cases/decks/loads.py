@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from fastcontact._tools.grouping import grouped
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.assembled import Element, Face, Target
 from fastcontact.cases.decks.blocks import key_of
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.histories import Histories, Period, ShapeGroups
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.mesh.mesh import starts_of
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
@@ -64,12 +66,21 @@ def distributed_loads(deck_mesh: DeckMesh, histories: Histories[Target]) -> list
                 scaled = tuple((time, factor * value) for time, value in table)
                 by_shape.add((load.keyword, load.kind, load.numbers, cell), scaled, rows)
     adders: list[Adder] = []
-    for number, ((_, kind, vector, cell), indices, value, table) in enumerate(by_shape, start=1):
+    uniform = chain.from_iterable(_split(group) if group[0][1] == "CENTRIF" else [group] for group in by_shape)
+    for number, ((_, kind, vector, cell), indices, value, table) in enumerate(uniform, start=1):
         group = f"{GROUP_NAMES.get(kind, 'load')} {number}"
         deck_mesh.groups[group] = {cell: indices.tolist()}
         if any(multiplier for _, multiplier in table):
             adders.append(partial(_add_load, kind=kind, vector=vector, group=group, value=value, table=table))
     return adders
+
+
+def _split(group: tuple[Any, Indices, Any, Table]) -> Iterable[tuple[Any, Indices, Any, Table]]:
+    """Yield parts of a group of cells, see `ShapeGroups`, each with the value 1 and its own history."""
+    key, indices, value, table = group
+    values = value(indices) if callable(value) else np.ones(len(indices))
+    for factor in np.unique(values).tolist():
+        yield key, indices[values == factor], 1.0, tuple((time, factor * multiplier) for time, multiplier in table)
 
 
 def _cells_of(deck_mesh: DeckMesh, load: Target) -> Iterable[tuple[str, float, list[int]]]:
@@ -89,41 +100,32 @@ def _add_load(model: Model, kind: str, vector: tuple[float, ...], group: str, va
         model.add_heat_flux(group, value, ramp=table)
     elif kind == "BF":
         model.add_heat_source(value, group, ramp=table)
+    elif kind == "CENTRIF":  # without the check of the axis, since CalculiX allows any axis
+        model.loads.append(Centrifugal((group,), 1.0, vector[:3], vector[3:], table))  # type: ignore[arg-type]
     else:
         model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, model.mesh.dim))
 
 
 def _density(deck_mesh: DeckMesh, element: Element, load: Target) -> float:
-    """Return the factor of a body force at an element: the density of its material, or 1 for a force per volume."""
+    """Return the factor of a load at an element: the density of its material for gravity, otherwise 1."""
     if load.kind[0] == "B":
         return 1.0
     material = deck_mesh.content.materials[key_of(element.section.material)]
     if material.density is None:
         raise load.location.error(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
-    return material.density
+    return material.density if load.kind == "GRAV" else 1.0
 
 
 def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
     """Return the components of a body force for a load multiplier of 1, times the factor `value` of the cells."""
 
-    def scaled(component: Any) -> Any:
-        if not callable(value):
-            return component
-        return lambda points: value(points) * (component(points) if callable(component) else component)
+    def scaled(component: float) -> Any:
+        return component if not callable(value) else lambda points: component * value(points)
 
     if kind[0] == "B":
         return {kind[1].lower(): scaled(1.0)}
-    if kind == "GRAV":
-        direction = np.array(vector) / np.linalg.norm(vector)
-        return {"xyz"[k]: scaled(float(direction[k])) for k in range(dim) if direction[k]}
-    origin, axis = np.array(vector[:3]), np.array(vector[3:])
-    axis = axis / np.linalg.norm(axis)
-
-    def outward(k: int, points: Array) -> Array:
-        relative = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))) - origin
-        return np.asarray((relative - np.outer(relative @ axis, axis))[:, k])
-
-    return {"xyz"[k]: scaled(partial(outward, k)) for k in range(dim) if abs(axis[k]) < 1.0}
+    direction = np.array(vector) / np.linalg.norm(vector)
+    return {"xyz"[k]: scaled(float(direction[k])) for k in range(dim) if direction[k]}
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.elasticity import loads
-from fastcontact.elasticity.following_pressure import FollowerPressure
+from fastcontact.elasticity.following_loads import FollowerCentrifugal, FollowerLoad, FollowerPressure
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import Load, Pressure, Value, axis_values, check_number
 from fastcontact.errors import ModelError
@@ -129,6 +129,8 @@ class ModelLoads(ModelHeat):
     ) -> None:
         """Apply centrifugal forces to groups of solid cells, computed from the densities of their materials.
 
+        In finite strain, the forces are proportional to the distances of the deformed positions from the axis.
+
         Parameters
         ----------
         speed : float
@@ -168,7 +170,8 @@ class ModelLoads(ModelHeat):
     ) -> None:
         """Apply the pressure of a liquid at rest to a group of outer facets.
 
-        The pressure is `weight` times the depth below the free surface, and zero above it.
+        The pressure is `weight` times the depth below the free surface, and zero above it. In finite strain, the depth is
+        that of the undeformed position.
 
         Parameters
         ----------
@@ -306,14 +309,18 @@ class ModelLoads(ModelHeat):
             check_forces(self.mesh, forces, related, load.name)
         return sums_by_ramp((load.ramp, forces) for load, forces in zip(self.loads, vectors, strict=True))
 
-    def following_pressures(self) -> list[tuple[FollowerPressure, Table | None]]:
-        """Return the pressures, as loads that follow the deformed surface, with their histories."""
-        pressures = [load for load in self.loads if isinstance(load, Pressure)]
-        return [(FollowerPressure(self.mesh, self.kinematics, load), load.ramp) for load in pressures]
+    def following_loads(self) -> list[tuple[FollowerLoad, Table | None]]:
+        """Return the loads that depend on displacements, pressures before centrifugal forces, with their histories."""
+        of_mesh, spins = (self.mesh, self.kinematics), [load for load in self.loads if isinstance(load, Centrifugal)]
+        following: list[tuple[FollowerLoad, Table | None]] = [
+            (FollowerPressure(*of_mesh, load), load.ramp) for load in self.loads if isinstance(load, Pressure)
+        ]
+        return [*following, *((FollowerCentrifugal(*of_mesh, load, self.densities()), load.ramp) for load in spins)]
 
     def load_vector(self, load: Load) -> Array:
         """Return the nodal forces (n_points, dim) [force] of a load at multiplier 1."""
-        density = None
-        if isinstance(load, InertiaLoad):
-            density = Densities([m for m, _ in self.materials], self.material_of_cells())
-        return load.vector(self.mesh, self.kinematics, density)
+        return load.vector(self.mesh, self.kinematics, self.densities() if isinstance(load, InertiaLoad) else None)
+
+    def densities(self) -> Densities:
+        """Return the densities of all solid cells."""
+        return Densities([material for material, _ in self.materials], self.material_of_cells())

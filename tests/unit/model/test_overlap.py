@@ -248,8 +248,7 @@ def test_supports_that_tear_what_is_tied(kind):
 
 
 def test_tied_sides_may_not_be_shifted_along_each_other():
-    model = elastic_model(block_on_block(), CONT_LOWER="xy", CONT_UPPER="y")
-    model.prescribe("CONT_UPPER", x=0.03)
+    model = elastic_model(block_on_block(), CONT_LOWER="xy", CONT_UPPER={"x": 0.03, "y": 0.0})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", kind="tied")
     refused(fc.ModelError, r"off 'CONT_LOWER', contact 'pair', by up to 0\.03 ", model.check)
 

@@ -1,12 +1,14 @@
-"""Follower pressure: nodal forces and load stiffness (Bonet and Wood, 2008, section 8.5)."""
+"""Loads that depend on the displacements: pressures and centrifugal forces; their nodal forces and load stiffness."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Numbers
-from fastcontact.elasticity.loads import Pressure, evaluated
+from fastcontact.elasticity.inertia_loads import Centrifugal
+from fastcontact.elasticity.loads import DensityField, Pressure, evaluated
+from fastcontact.elasticity.mass import mass
 from fastcontact.linear.sparse_rows import Blocks, assembled
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import weighted_area_vectors
@@ -19,6 +21,8 @@ POINTS = 4
 
 class FollowerPressure:
     """A pressure that acts along the normals of deformed facets, with values evaluated at the undeformed positions.
+
+    See Bonet and Wood (2008, section 8.5).
 
     Parameters
     ----------
@@ -54,3 +58,28 @@ class FollowerPressure:
             blocks.append((dofs, dofs, K.reshape(*dofs.shape, -1)))
         total = assembled(blocks, (x.size, x.size))
         return forces, csr_array(0.5 * (total + total.T))
+
+
+class FollowerCentrifugal:
+    """A centrifugal force that acts along the radii of deformed positions.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+    load : Centrifugal
+    density : DensityField
+        Densities of the solid cells.
+    """
+
+    def __init__(self, mesh: Mesh, kinematics: str, load: Centrifugal, density: DensityField) -> None:
+        self._undeformed = load.vector(mesh, kinematics, density)
+        self._K = mass(mesh, kinematics, density, load.groups)
+        self._K.data = -self._K.data @ load.gradient(mesh.dim)
+
+    def at(self, displacement: Array) -> tuple[Array, bsr_array]:
+        """Return the nodal forces and the load stiffness (spin softening), see `FollowerPressure.at`."""
+        return self._undeformed - (self._K @ displacement.ravel()).reshape(displacement.shape), self._K
+
+
+FollowerLoad = FollowerPressure | FollowerCentrifugal
