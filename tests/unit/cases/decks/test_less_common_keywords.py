@@ -290,9 +290,21 @@ def test_no_separation_holds_what_was_once_closed(tmp_path):
     assert forces == pytest.approx([100.0, -40.0])
 
 
-def test_stabilisation_is_noted(tmp_path):
-    deck = deck_of(tmp_path, WHOLE.replace("*Static\n", "*Static, stabilize=0.0002\n"))
-    assert "STABILIZE has no effect" in notes_of(deck)
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("*Static\n", "*Static, stabilize=0.0002\n", "STABILIZE has no effect"),
+        (
+            "=si\n",
+            "=si\n*Surface Behavior, pressure-overclosure=TIED\n1.\n*Friction\n0.1\n",
+            "no effect in tied contact",
+        ),
+        (STEP, STEP + STEP.replace("*Step", "*Step, nlgeom"), "NLGEOM applies to all steps: finite strains"),
+    ],
+)
+def test_what_has_no_or_a_wider_effect_is_noted(tmp_path, old, new, said):
+    deck = deck_of(tmp_path, WHOLE.replace(old, new, 1))
+    assert said in notes_of(deck)
 
 
 def test_temperatures_of_nodes_that_each_go_their_own_way(tmp_path):

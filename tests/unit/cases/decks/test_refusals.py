@@ -2,7 +2,7 @@
 
 import pytest
 from case_texts import FLAT
-from deck_text import CONTACT, MATERIAL, NODES, STEP, WHOLE, deck_of
+from deck_text import CONTACT, MATERIAL, NODES, STEP, WHOLE, deck_of, static_steps
 from refusals import refused
 
 import fastcontact as fc
@@ -52,11 +52,18 @@ def with_load(lines):
     return before("*Dsload", lines)
 
 
+def in_steps(*lines):
+    return before("*Elastic", "*Density\n3.\n", instead(STEP, static_steps(*lines)))
+
+
+def flat_load(load, kind="CPE4"):
+    return before("*Cload", f"*Dload\none, {load}\n", FLAT.replace("CPE4", kind))
+
+
 MODEL = {
     "system of nodes": (instead("*Node\n", "*Node, system=C\n"), r"\*NODE: SYSTEM=C is not supported: give rectang"),
     "element twice": (
-        before("*Nset, nset=bottom", "*Element, type=C3D8\n2, 1, 2, 3, 4, 5, 6, 7, 8\n"), "element 2 is defined twice",
-    ),
+        before("*Nset, nset=bottom", "*Element, type=C3D8\n2, 1, 2, 3, 4, 5, 6, 7, 8\n"), "element 2 is defined twice"),
     "range that falls": (instead("1, 4\n*Nset", "4, 1\n*Nset"), "the range 4 to 1 by 1 is empty: it must ascend"),
     "surface twice": (before("*Surface, name=roof", "*Surface, name=SM\nup, S1\n"), "surface 'SM' is defined twice"),
     "load without a step": (before("*Step", "*Cload\n17, 3, 1.\n"), r"\*CLOAD: loads belong in a step"),
@@ -66,9 +73,7 @@ MODEL = {
     "kinematic nowhere": (with_relation("*Kinematic\n1, 3\n"), r"\*KINEMATIC: belongs below \*COUPLING"),
     "coupling alone": (with_relation("*Coupling, ref node=1, surface=ss\n"), r"\*KINEMATIC or \*DISTRIBUTING must"),
     "coupling at the end": (
-        instead(STEP, "*Coupling, ref node=1, surface=ss\n"),
-        r"\*COUPLING: \*KINEMATIC or \*DISTRIBUTING must follow",
-    ),
+        instead(STEP, "*Coupling, ref node=1, surface=ss\n"), r"\*COUPLING: \*KINEMATIC or \*DISTRIBUTING must follow"),
     "perturbation": (instead("*Step\n", "*Step, perturbation\n"), "PERTURBATION is not supported with"),
     "step without length": (instead("*Static\n", "*Static\n1., 0.\n"), "the increment and the length of the step must"),
     "thickness": (FLAT.replace("material=steel\n1.", "material=steel\n0.", 1), "the thickness 0 must be positive"),
@@ -85,9 +90,7 @@ MODEL = {
 PARTS = {
     "instance of nothing": (in_parts().replace("part=p", "part=q"), "part 'q' is not defined; parts: p"),
     "instance twice": (
-        in_parts(further="*Instance, name=I, part=p\n*End Instance\n"),
-        r"\*INSTANCE: instance 'I' is defined twice",
-    ),
+        in_parts(further="*Instance, name=I, part=p\n*End Instance\n"), r"\*INSTANCE: instance 'I' is defined twice"),
     "instance of three lines": (
         in_parts("0., 0., 0.\n0., 0., 0., 0., 0., 1., 0.\n1.\n"),
         "an instance has at most two data lines: a translation and a rotation",
@@ -99,7 +102,7 @@ PARTS = {
         in_parts(further="*Nset, nset=all, instance=j\ntop\n") + "*Boundary\nall, 1\n" + STEP.replace("roof", "i.roof"),
         r"\*NSET: instance 'J' is not defined; instances: i",
     ),
-}
+}  # fmt: skip
 MATERIALS = {
     "elastic of another kind": (instead("*Elastic", "*Elastic, type=lamina"), "TYPE=LAMINA is not supported; expected"),
     "constants without energy": (
@@ -112,22 +115,18 @@ MATERIALS = {
         "orientation 'O' is defined twice",
     ),
     "orientation with an origin": (
-        with_orientation("1., 0., 0., 0., 1., 0., 0., 0., 1.\n"),
-        "an origin of the axes is not supported",
-    ),
+        with_orientation("1., 0., 0., 0., 1., 0., 0., 0., 1.\n"), "an origin of the axes is not supported"),
     "orientation turned further": (
-        with_orientation("1., 0., 0., 0., 1., 0.\n3, 30.\n"),
-        "a further rotation of the axes is not supported",
-    ),
+        with_orientation("1., 0., 0., 0., 1., 0.\n3, 30.\n"), "a further rotation of the axes is not supported"),
     "density": (with_material("*Density\n0.\n"), "material 'steel': the density 0 must be positive"),
-}
+}  # fmt: skip
 CONTACTS = {
     "negative friction": (with_law("*Friction\n-0.1\n"), "the coefficient of friction -0.1 is negative"),
     "friction by pressure": (with_law("*Friction\n0.1, , 5.\n"), "friction that depends on pressure or temperature"),
     "slope": (with_law("*Surface Behavior, pressure-overclosure=LINEAR\n0.\n"), "the slope 0 must be positive"),
-    "friction where it is tied": (
-        with_law("*Surface Behavior, pressure-overclosure=TIED\n1.\n*Friction\n0.1\n"),
-        r"\*SURFACE INTERACTION: friction with tied contact is not supported",
+    "friction without separation": (
+        with_law("*Surface Behavior, no separation\n*Friction\n0.1\n"),
+        r"\*SURFACE INTERACTION: friction with NO SEPARATION is not supported",
     ),
     "clearance of nothing": (
         with_relation("*Clearance, slave=ss, master=roof, value=0.1\n"),
@@ -137,7 +136,7 @@ CONTACTS = {
         with_relation("*Clearance, slave=ss, master=sm, value=0.1\n", instead("11, 0., 0., 1.", "11, 0., 0., 1.1")),
         r"\*CLEARANCE is supported between sides at a uniform distance only",
     ),
-    "adjust by a word": (instead("type=SURFACE TO", "adjust=some, type=SURFACE TO"), "ADJUST=some: only a distance"),
+    "adjust by a word": (instead("type=SURFACE TO", "adjust=some, type=SURFACE TO"), "set 'some' is not defined"),
     "a surface without faces": (instead("up, S1\n", ""), "surface 'ss' has no faces"),
     "an orientation that is not there": (
         with_relation("*Coupling, ref node=15, surface=roof, orientation=o\n*Kinematic\n3\n"),
@@ -150,14 +149,12 @@ CONTACTS = {
         "element 7 is not a solid, so it has no faces",
     ),
     "free faces of one that is none": (
-        instead("up, S1\n", "7,\n", before("*Nset, nset=bottom", SPRING)),
-        "element 7 is not a solid, so it has no faces",
-    ),
+        instead("up, S1\n", "7,\n", before("*Nset, nset=bottom", SPRING)), "element 7 is not a solid, so it has no faces"),
     "nodes that are no faces": (
         before("*Surface, name=roof", "*Surface, name=few, type=NODE\n15\n16\n", instead("ss, sm", "few, sm")),
         "no facet of 'few' faces 'sm'",
     ),
-}
+}  # fmt: skip
 RELATIONS = {
     "equation of none": (with_relation("*Equation\n0\n"), "an equation cannot have 0 terms"),
     "equation too short": (with_relation("*Equation\n2\n15, 1, 1.\n"), "the equation has 1 terms, 2 are announced"),
@@ -200,8 +197,31 @@ LOADS = {
         before("*Step", "*Amplitude, name=a\n0., 1., 0., 2.\n"),
         "needs pairs of time and multiplier, with ascending times",
     ),
-}
-CASES = {**MODEL, **PARTS, **MATERIALS, **CONTACTS, **RELATIONS, **LOADS}
+}  # fmt: skip
+ROOF = "*Dsload\nroof, P, 1.\n"
+STEPS = {
+    "equal forces": (in_steps("*Cload\ntop, 3, 1.\n15, 3, 1.\n"), "1 is the second value in this step, after 1 in line"),
+    "solid twice": (in_steps("*Dload\nup, BX, 1.\n2, BX, 1.\n"), "1 is the second value in this step, after 1 in"),
+    "node twice": (in_steps("*Cload\ntop, 3, 1.\n").replace("\n15, 16", "\n16, 15, 16"), "'top' lists a member twice"),
+    "face twice": (in_steps(ROOF).replace("roof\nup, S2\n", "roof\nup, S2\n2, S2\n"), "'roof' lists a member twice"),
+    "weight of another set": (
+        in_steps("*Dload\nup, GRAV, 1., 0., 0., -1.\n", "*Dload\n2, GRAV, 2., 0., 0., -2.\n"), r"GRAV acts by line \d+ on"),
+    "two axes": (
+        in_steps("*Dload\nup, CENTRIF, 1., 0, 0, 0, 0, 0, 1\n, CENTRIF, 1., 0, 0, 0, 1, 0, 0\n"), r"CENTRIF acts by line"),
+    "new list of one keyword": (in_steps(ROOF, "*Dload, op=NEW\n"), "CalculiX removes .*, Abaqus keeps it: give OP=NEW"),
+    "face of two keywords": (in_steps(ROOF, "*Dload\nup, P2, 1.\n"), "CalculiX replaces the load of .*, Abaqus adds"),
+    "new forces late": (in_steps("*Cload\n15, 3, 1.\n*Cload, op=NEW\n16, 3, 1.\n"), r"missing in the first \*CLOAD of"),
+    "new supports late": (in_steps("*Boundary\n15, 1\n*Boundary, op=NEW\n16, 1\n"), r"missing in the first \*BOUNDARY of"),
+    "restart": (before("*Step", "*Restart, read\n"), r"\*RESTART: READ is not supported"),
+    "rubber by temperature": (
+        instead("*Elastic\n200000., 0.", "*Hyperelastic, neo hooke\n1., 1., 0.\n2., 1., 9."), "has 2 constants, at one temp"),
+    "weight out of the plane": (flat_load("GRAV, 1., 0., 1., 1."), "GRAV must not cause forces normal to the plane"),
+    "force out of the plane": (flat_load("BZ, 1."), "BZ must not cause forces normal to the plane"),
+    "axis inclined to the plane": (flat_load("CENTRIF, 1., 0., 0., 0., 0., 1., 1."), "CENTRIF must not cause forces normal"),
+    "radial weight": (flat_load("GRAV, 1., 1., 0., 0.", "CAX4"), "GRAV must be along the axis of symmetry, y"),
+    "eccentric axis": (flat_load("CENTRIF, 1., 1., 0., 0., 0., 1., 0.", "CAX4"), "CENTRIF must be along the axis of symm"),
+}  # fmt: skip
+CASES = {**MODEL, **PARTS, **MATERIALS, **CONTACTS, **RELATIONS, **LOADS, **STEPS}
 
 
 @pytest.mark.parametrize("what", CASES)
