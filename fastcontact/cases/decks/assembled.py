@@ -430,19 +430,20 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
     if label not in element_loads:
         labels = ", ".join([f"{letter}1", f"{letter}2", "...", *element_loads])
         raise row.error(f"{load}{label[:40]} is not supported; expected one of {labels}")
-    vector = np.array([row.number(3 + i, 0.0) for i in range(element_loads[label])] or [0.0, 0.0, label == "BZ"])
-    if element_loads[label]:
-        if not vector[-3:].any():
-            raise row.error(f"the direction of {label} is missing")
-        vector[-3:] /= np.linalg.norm(vector[-3:])
+    if label == "BZ" and assembly.dim == 2:
+        raise row.error("BZ must not cause forces normal to the plane of the model")
+    if not element_loads[label]:
+        return [Target(keyword, row.location, label, None, (element,)) for element in elements]
+    vector = np.array([row.number(3 + i, 0.0) for i in range(element_loads[label])])
+    if not vector[-3:].any():
+        raise row.error(f"the direction of {label} is missing")
+    vector[-3:] /= np.linalg.norm(vector[-3:])
     if label == "CENTRIF":
         vector[3:] *= np.sign(vector[3 + np.argmax(np.abs(vector[3:]))])
         vector[:3] -= vector[:3] @ vector[3:] * vector[3:]
     if assembly.dim == 2:
         _check_plane_load(assembly, row, label, vector)
-    if element_loads[label]:
-        return [Target(keyword, row.location, label, None, tuple(elements), tuple(vector.tolist()))]
-    return [Target(keyword, row.location, label, None, (element,)) for element in elements]
+    return [Target(keyword, row.location, label, None, tuple(elements), tuple(vector.tolist()))]
 
 
 def _check_plane_load(assembly: Assembly, row: Row, label: str, vector: Array) -> None:

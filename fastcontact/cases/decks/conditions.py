@@ -152,13 +152,13 @@ class Conditions:
         """Raise CaseError if *DLOAD and *DSLOAD interact, whose loads form one list in CalculiX, but two in Abaqus."""
         loads = self.loads
         kept = {load.face or load: load for load in loads.tracks if loads.keeps(load)}
-        for block in step.conditions if kept else ():
-            if block.keyword in ("DLOAD", "DSLOAD") and block.removes_earlier:
-                removed = f"CalculiX removes the load of {next(iter(kept.values()))}, Abaqus keeps it"
-                raise block.error(f"{removed}: give OP=NEW with both keywords, and repeat loads that remain")
-        for load, value in loads.step_values.items():
-            if load.face in kept:
-                raise value.location.error(f"CalculiX replaces the load of {kept[load.face]}, Abaqus adds to it")
+        lists = [b.location for b in step.conditions if kept and b.removes_earlier and b.keyword in ("DLOAD", "DSLOAD")]
+        replaced = [value.location for load, value in loads.step_values.items() if load.face in kept]
+        for location in (*lists, *replaced):
+            raise location.error(
+                f"CalculiX replaces the load of {next(iter(kept.values()))}, which remains in Abaqus: give OP=NEW with both "
+                "keywords, and repeat the loads that remain"
+            )
 
     def _force_components(self, row: Row) -> list[Component]:
         """Return the components on which the nodal force of a line acts."""
