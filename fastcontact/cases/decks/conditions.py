@@ -206,9 +206,7 @@ class Conditions:
 
     def _record_supports(self, block: Block, precedes_steps: bool = False) -> None:
         """Record a block *BOUNDARY of the current step or, if `precedes_steps` is true, one that precedes all steps."""
-        kind = block.get("TYPE", "DISPLACEMENT").upper()
-        if kind != "DISPLACEMENT":
-            raise block.error(f"TYPE={kind} is not supported, only DISPLACEMENT")
+        block.choice("TYPE", ("DISPLACEMENT",))
         if not precedes_steps:
             self.supports.begin(block)
             self.fixed_temperatures.begin(block)

@@ -86,9 +86,7 @@ def _moduli(values: list[float]) -> Array:
 
 def density(content: Content, current: Material, block: Block) -> None:
     """Read *DENSITY: the mass per volume."""
-    current.density = block.only_row().number(0)
-    if not current.density > 0:
-        raise block.error(f"{current.prefix}the density {current.density:g} must be positive")
+    current.density = block.only_row().positive(0, "density")
 
 
 def plastic(content: Content, current: Material, block: Block) -> None:

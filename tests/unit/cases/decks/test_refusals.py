@@ -71,7 +71,7 @@ MODEL = {
     "coupling at the end": (
         instead(STEP, "*Coupling, ref node=1, surface=ss\n"), r"\*COUPLING: \*KINEMATIC or \*DISTRIBUTING must follow"),
     "perturbation": (instead("*Step\n", "*Step, perturbation\n"), "PERTURBATION is not supported with"),
-    "step without length": (instead("*Static\n", "*Static\n1., 0.\n"), "the increment and the length of the step must"),
+    "step without length": (instead("*Static\n", "*Static\n1., 0.\n"), "the length of the step 0 must be positive"),
     "thickness": (FLAT.replace("material=steel\n1.", "material=steel\n0.", 1), "the thickness 0 must be positive"),
     "two thicknesses": (FLAT.replace("1.\n*Boundary", "2.\n*Boundary"), "thickness 2 after 1: plane models have one"),
     "not flat": (FLAT.replace("6, 2., 1.", "6, 2., 1., 0.5"), "CPE4 lie in the plane z = const, but z differs"),
@@ -109,7 +109,7 @@ MATERIALS = {
         with_orientation("1., 0., 0., 0., 1., 0., 0., 0., 1.\n"), "an origin of the axes is not supported"),
     "orientation turned further": (
         with_orientation("1., 0., 0., 0., 1., 0.\n3, 30.\n"), "a further rotation of the axes is not supported"),
-    "density": (before("*Solid Section, elset=low", "*Density\n0.\n"), "material 'steel': the density 0 must be positive"),
+    "density": (before("*Solid Section, elset=low", "*Density\n0.\n"), "the density 0 must be positive"),
 }  # fmt: skip
 CONTACTS = {
     "negative friction": (with_law("*Friction\n-0.1\n"), "the coefficient of friction -0.1 is negative"),
@@ -164,7 +164,7 @@ RELATIONS = {
         "gap elements are supported on all nodes of whole faces only"),
 }  # fmt: skip
 LOADS = {
-    "velocity": (instead("*Boundary", "*Boundary, type=VELOCITY"), "TYPE=VELOCITY is not supported, only DISPLACEMENT"),
+    "velocity": (instead("*Boundary", "*Boundary, type=VELOCITY"), "TYPE=VELOCITY is not supported; expected one of DISP"),
     "antisymmetry": (instead("x0, 1", "x0, XASYMM"), "XASYMM is not supported: give the components"),
     "rotation of a solid": (with_load("*Boundary\n15, 4, 4, 0.1\n"), "component 4 does not exist at nodes of this"),
     "force on component 7": (with_load("*Cload\n15, 7, 1.\n"), "a force cannot act on component 7 of this node"),
