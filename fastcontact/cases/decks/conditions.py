@@ -155,10 +155,8 @@ class Conditions:
         lists = [b.location for b in step.conditions if kept and b.removes_earlier and b.keyword in ("DLOAD", "DSLOAD")]
         replaced = [value.location for load, value in loads.step_values.items() if load.face in kept]
         for location in (*lists, *replaced):
-            raise location.error(
-                f"CalculiX replaces the load of {next(iter(kept.values()))}, which remains in Abaqus: give OP=NEW with both "
-                "keywords, and repeat the loads that remain"
-            )
+            text = f"CalculiX replaces the load of {next(iter(kept.values()))}, which remains in Abaqus"
+            raise location.error(f"{text}: give OP=NEW with both keywords, and repeat the loads that remain")
 
     def _force_components(self, row: Row) -> list[Component]:
         """Return the components on which the nodal force of a line acts."""

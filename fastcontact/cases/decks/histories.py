@@ -176,9 +176,7 @@ class Histories(Generic[Key]):
         if not block.removes_earlier:
             return
         if not first.removes_earlier:
-            raise block.error(
-                f"OP=NEW is missing in the first *{first.keyword} of the step, line {first.location.line}"
-            )
+            raise block.error(f"OP=NEW is missing in the first *{first.keyword}, line {first.location.line}")
         self.initial = {}
         earlier = (key for key in self.tracks if getattr(key, "keyword", block.keyword) == block.keyword)
         self.removals.update(dict.fromkeys(filter(self.keeps, earlier)))

@@ -189,8 +189,8 @@ STEPS = {
         in_steps("*Dload\nup, CENTRIF, 1., 0, 0, 0, 0, 0, 1\n, CENTRIF, 1., 0, 0, 0, 1, 0, 0\n"), r"CENTRIF acts by line"),
     "new list of one keyword": (in_steps(ROOF, "*Dload, op=NEW\n"), "CalculiX replaces .* remains in Abaqus: give OP=NEW"),
     "face of two keywords": (in_steps(ROOF, "*Dload\nup, P2, 1.\n"), "CalculiX replaces the load of .*DSLOAD, which"),
-    "new forces late": (in_steps("*Cload\n15, 3, 1.\n*Cload, op=NEW\n16, 3, 1.\n"), r"missing in the first \*CLOAD of"),
-    "new supports late": (in_steps("*Boundary\n15, 1\n*Boundary, op=NEW\n16, 1\n"), r"missing in the first \*BOUNDARY of"),
+    "new forces late": (in_steps("*Cload\n15, 3, 1.\n*Cload, op=NEW\n16, 3, 1.\n"), r"missing in the first \*CLOAD, line"),
+    "new supports late": (in_steps("*Boundary\n15, 1\n*Boundary, op=NEW\n16, 1\n"), r"missing in the first \*BOUNDARY, line"),
     "restart": (before("*Step", "*Restart, read\n"), r"\*RESTART: READ is not supported"),
     "rubber by temperature": (
         instead("*Elastic\n200000., 0.", "*Hyperelastic, neo hooke\n1., 1., 0.\n2., 1., 9."), "has 2 constants, at one temp"),
