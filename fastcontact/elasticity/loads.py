@@ -304,7 +304,7 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
 
     Raises ModelError, with the name of the `group`, if a facet does not lie on the outside of a solid.
     """
-    remedy = ", where a pressure has no direction: use add_traction there"
+    remedy = ", where a pressure has no direction: use a traction there"
     rows = outer_rows(mesh, group, element, block, ModelError, remedy)
     return np.ascontiguousarray(outer_facets(mesh)[element][rows])
 

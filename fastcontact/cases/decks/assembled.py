@@ -13,12 +13,13 @@ import numpy as np
 
 from fastcontact._tools.grouping import grouped
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.blocks import LONGEST_QUOTED, Location, Row, key_of, look_up
+from fastcontact.cases.decks.blocks import LONGEST_QUOTED, Located, Location, Row, key_of, look_up
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Surface, SurfaceEntry
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Largest number of set names that a message lists.
 MOST_NAMES = 12
@@ -80,6 +81,8 @@ class Assembly:
         Faces of the surfaces that have been resolved so far.
     being_resolved : list of (str, str, str)
         Sets that are being resolved, for the detection of sets that contain themselves.
+    repeating : set of (str, str, str)
+        Sets and surfaces that list a member several times.
     """
 
     content: Content
@@ -89,6 +92,7 @@ class Assembly:
     resolved: dict[tuple[str, str, str], list[Any]] = field(default_factory=dict)
     surfaces: dict[str, list[Face]] = field(default_factory=dict)
     being_resolved: list[tuple[str, str, str]] = field(default_factory=list)
+    repeating: set[tuple[str, str, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         """Add the points and elements of all instances. Raises CaseError if an element uses an undefined node."""
@@ -178,7 +182,9 @@ class Assembly:
             self.being_resolved.append(key)
             members = [member for entry in sets[name] for member in self._members_of_entry(kind, scope, entry)]
             self.being_resolved.pop()
-            self.resolved[key] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
+            self.resolved[key] = list(dict.fromkeys(members))
+            self.repeating.update([key] if len(self.resolved[key]) < len(members) else [])
+        self.repeating.update(self.being_resolved if key in self.repeating else [])
         return self.resolved[key]
 
     def _members_of_entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
@@ -205,7 +211,7 @@ class Assembly:
         part, name = self.part(scope), key_of(entry.name)
         if kind == "node" and name not in part.node_sets and name in part.element_sets:
             elements = self.members_of("element", scope, name, entry.location)
-            return (point for element in elements for point in element.points)
+            return dict.fromkeys(point for element in elements for point in element.points)
         return self.members_of(kind, scope, name, entry.location, entry.name)
 
     def _items_of(self, kind: str, scope: str) -> Mapping[int, Any]:
@@ -251,11 +257,12 @@ class Assembly:
                 )
             return complete
         if (key := key_of(name)) not in self.surfaces:
-            faces: dict[Face, None] = {}
+            faces: list[Face] = []
             for entry in definition.entries:
                 members = self.elements_of(qualified(scope, entry.name), entry.location)
-                faces.update(dict.fromkeys(face for element in members for face in self._faces_of(element, entry)))
-            self.surfaces[key] = list(faces)
+                faces += (face for element in members for face in self._faces_of(element, entry))
+            self.surfaces[key] = list(dict.fromkeys(faces))
+            self.repeating.update([("surface", *self.split_name(name))] if len(self.surfaces[key]) < len(faces) else [])
         return self.surfaces[key]
 
     def surface(self, name: str, location: Location) -> tuple[Surface, str]:
@@ -381,11 +388,11 @@ ELEMENT_LOADS = {"DLOAD": {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}, 
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class Target(Located):
     """Target of a distributed load, a face or elements, with the keyword, the location and the kind of the load.
 
-    `numbers` contains the direction [-] of gravity, two vectors for the axis of rotation of centrifugal forces (origin
-    [length] and direction [-]), or the film coefficient [power / (area temperature)].
+    `numbers` contains the unit vector [-] of gravity, two vectors for the axis of rotation of centrifugal forces (its point
+    [length] closest to the origin, and a unit vector [-] along it), or the film coefficient [power / (area temperature)].
     """
 
     keyword: str
@@ -418,7 +425,29 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
     if label not in element_loads:
         labels = ", ".join([f"{letter}1", f"{letter}2", "...", *element_loads])
         raise row.error(f"{load}{label[:40]} is not supported; expected one of {labels}")
-    vector = tuple(row.number(3 + i, 0.0) for i in range(element_loads[label]))
-    if vector and not any(vector[-3:]):
+    if label == "BZ" and assembly.dim == 2:
+        raise row.error("BZ must not cause forces normal to the plane of the model")
+    if not element_loads[label]:
+        return [Target(keyword, row.location, label, None, (element,)) for element in elements]
+    vector = np.array([row.number(3 + i, 0.0) for i in range(element_loads[label])])
+    if not vector[-3:].any():
         raise row.error(f"the direction of {label} is missing")
-    return [Target(keyword, row.location, label, None, tuple(elements), vector)]
+    vector[-3:] /= np.linalg.norm(vector[-3:])
+    if label == "CENTRIF":
+        vector[3:] *= np.sign(vector[3 + np.argmax(np.abs(vector[3:]))])
+        vector[:3] -= vector[:3] @ vector[3:] * vector[3:]
+    if assembly.dim == 2:
+        _check_plane_load(assembly, row, label, vector)
+    return [Target(keyword, row.location, label, None, tuple(elements), tuple(vector.tolist()))]
+
+
+def _check_plane_load(assembly: Assembly, row: Row, label: str, vector: Array) -> None:
+    """Raise CaseError if gravity or the axis of a centrifugal force is not admissible in a plane or axisymmetric model."""
+    axial, points = label == "CENTRIF", assembly.points
+    x, y, z = np.abs(vector[-3:]) > LENGTH_ROUND_OFF
+    offset = np.abs(vector[:3] - [0.0, 0.0, points[0, 2]]) > LENGTH_ROUND_OFF * np.ptp(points, axis=0).max()
+    if assembly.kinematics == "axisymmetric":
+        if x or z or (axial and (offset[0] or offset[2])):
+            raise row.error(f"{label} must be along the axis of symmetry, y")
+    elif (z and (x or y or not axial)) or (axial and offset[2] and not z):
+        raise row.error(f"{label} must not cause forces normal to the plane of the model")

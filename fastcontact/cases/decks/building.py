@@ -295,19 +295,20 @@ class Building:
                 )
             return {"clearance": pair.clearance - float(gaps.mean())}
         try:
-            adjusted_distance = float(pair.adjust)
+            adjusted = gaps <= float(pair.adjust)
         except ValueError:
-            raise pair.error(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
-        closed = gaps[(gaps <= adjusted_distance) & (np.abs(gaps) > tolerance)]
+            nodes = self.model.mesh.points[self.assembly.nodes(pair.adjust, pair.location)]
+            adjusted = nearest(nodes, positions)[0] <= tolerance
+        closed = gaps[adjusted & (np.abs(gaps) > tolerance)]
         if not len(closed):
             return {}
-        uniform = np.ptp(gaps) <= tolerance
+        uniform = np.ptp(gaps) <= tolerance and adjusted.all()
         varying = f"of {closed.min():.6g} to {closed.max():.6g} at {len(closed)} nodes"
         distance = f"{gaps.mean():.6g}" if uniform else varying
         self.content.note(pair, f"ADJUST: the distance {distance} of the sides is taken as zero")
         if uniform:
             return {"clearance": -float(gaps.mean())}
-        clearances = -np.where(gaps <= adjusted_distance, gaps, 0.0)
+        clearances = -np.where(adjusted, gaps, 0.0)
         return {"clearance": lambda points: clearances[nearest(positions, points)[1]]}
 
     def _ramp(self, conditions: Conditions) -> Ramp:

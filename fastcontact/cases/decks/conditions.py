@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from fastcontact.cases.decks.assembled import Assembly, Face, Target, targets
+from fastcontact.cases.decks.assembled import Assembly, Element, Face, Target, targets
 from fastcontact.cases.decks.axes import local_directions
-from fastcontact.cases.decks.blocks import Block, Location, Row
+from fastcontact.cases.decks.blocks import Block, Location, Row, key_of
+from fastcontact.cases.decks.content import Step
 from fastcontact.cases.decks.histories import Histories, Value
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -24,6 +26,10 @@ NAMED = {
 }
 # Number of the degree of freedom of the temperature.
 TEMPERATURE = 11
+# Kinds of the sets that loads act on, by the first letters of the keyword.
+KINDS = {"CL": "node", "CF": "node", "DL": "element", "DF": "element", "DS": "surface"}
+# Difference of unit vectors, and of points relative to the size of the model, below which directions and axes are equal.
+SAME_DIRECTION = 1e-5
 # Point, component counted from 0, and whether the component is along a local axis.
 Component = tuple[int, int, bool]
 
@@ -45,6 +51,8 @@ class Conditions:
         All histories.
     film_of : dict of (str, face) to Target
         Film that acts last on each face, by keyword and face.
+    body_forces : dict of Element to list of (str, Target)
+        Gravity and centrifugal forces by element, with the set or element number of their line.
     reference : float
         Initial temperature of the bodies where temperatures are computed [temperature].
     directions : dict of int to ndarray (3, 3)
@@ -58,21 +66,22 @@ class Conditions:
         initial = {point: value for points, value, _ in temperatures for point in points}  # the last value applies
         self.reference = reference_temperature(assembly, initial) if content.heat else 0.0
         self.supports: Histories[Component] = Histories(content)
-        self.forces: Histories[Component] = Histories(content)
-        self.loads: Histories[Target] = Histories(content)
+        self.forces: Histories[Component] = Histories(content, additive=True)
+        self.loads: Histories[Target] = Histories(content, additive=True)
         self.given_temperatures: Histories[int] = Histories(content, baseline=initial)
         self.fixed_temperatures: Histories[int] = Histories(content, default=self.reference)
-        self.powers: Histories[int] = Histories(content)
-        self.fluxes: Histories[Target] = Histories(content)
+        self.powers: Histories[int] = Histories(content, additive=True)
+        self.fluxes: Histories[Target] = Histories(content, additive=True)
         self.films: Histories[Target] = Histories(content, default=self.reference)
         self.film_of: dict[tuple[str, Face | None], Target] = {}
+        self.body_forces: defaultdict[Element, list[tuple[str, Target]]] = defaultdict(list)
         self.by_keyword: dict[str, Histories[Any]] = {
             "CLOAD": self.forces, "TEMPERATURE": self.given_temperatures, "CFLUX": self.powers,
             **dict.fromkeys(("DLOAD", "DSLOAD"), self.loads), **dict.fromkeys(("DFLUX", "DSFLUX"), self.fluxes),
             **dict.fromkeys(("FILM", "SFILM"), self.films),
         }  # fmt: skip
-        loads = dict.fromkeys(self.by_keyword.values())
-        self.histories: tuple[Histories[Any], ...] = (self.supports, self.fixed_temperatures, *loads)
+        others = dict.fromkeys(self.by_keyword.values())
+        self.histories: tuple[Histories[Any], ...] = (self.supports, self.fixed_temperatures, *others)
         self.directions = local_directions(assembly)
         if assembly.dim == 3:  # rotations refer to the local axes of their node
             rotations, rotated = assembly.rotations, self.directions
@@ -84,12 +93,16 @@ class Conditions:
             self._record_supports(block, precedes_steps=True)
         for history in (self.supports, self.fixed_temperatures):
             history.initial, history.step_values = history.step_values, {}
-        for number, step in enumerate(self.assembly.content.steps, start=1):
+        steps = self.assembly.content.steps
+        both = {block.keyword for step in steps for block in step.conditions}.issuperset(("DLOAD", "DSLOAD"))
+        for number, step in enumerate(steps, start=1):
             for block in step.conditions:
                 if block.keyword == "BOUNDARY":
                     self._record_supports(block)
                 else:
                     self.by_keyword[block.keyword].record(block, map(self._load, block.iter_rows()))
+            if both and self.loads.first_blocks:
+                self._check_distributed_loads(step)
             for history in self.histories:
                 history.advance(number, step)
 
@@ -108,7 +121,42 @@ class Conditions:
             keys = self._films(row)
         else:
             keys = targets(self.assembly, row)
+        if row.text(1).upper() in ("GRAV", "CENTRIF"):
+            keys = [self._body_force(row, *keys)]
+        elif (KINDS.get(keyword[:2], ""), *self.assembly.split_name(row.text(0))) in self.assembly.repeating:
+            raise row.error(f"'{row.text(0)}' lists a member twice, on which the load acts twice in CalculiX")
         return keys, row.number(2), row.location
+
+    def _body_force(self, row: Row, load: Target) -> Target:
+        """Return the target of an earlier line that gravity or a centrifugal force of a line equals, or else its own target.
+
+        Raises CaseError if another force of this kind acts on its elements, apart from gravity in another direction.
+        """
+        name, size = key_of(row.text(0)), np.ptp(self.assembly.points, axis=0).max()
+        scales = np.array([size] * (len(load.numbers) - 3) + [1.0] * 3)
+        entries = {id(entry): entry for element in load.elements for entry in self.body_forces[element]}
+        for earlier_name, earlier in entries.values():
+            if earlier.kind == load.kind and (earlier in self.loads.step_values or self.loads.keeps(earlier)):
+                equal = (np.abs(np.subtract(load.numbers, earlier.numbers)) < SAME_DIRECTION * scales).all()
+                if equal and name == earlier_name:
+                    return earlier
+                if equal or load.kind == "CENTRIF":
+                    other = f"line {earlier.location.line} on elements of this set, but with another set or axis"
+                    raise row.error(f"{load.kind} acts by {other}: repeat them, or remove it by OP=NEW")
+        entry = (name, load)
+        for element in load.elements:
+            self.body_forces[element].append(entry)
+        return load
+
+    def _check_distributed_loads(self, step: Step) -> None:
+        """Raise CaseError if *DLOAD and *DSLOAD interact, whose loads form one list in CalculiX, but two in Abaqus."""
+        loads = self.loads
+        kept = {load.face or load: load for load in loads.tracks if loads.keeps(load)}
+        lists = [b.location for b in step.conditions if kept and b.removes_earlier and b.keyword in ("DLOAD", "DSLOAD")]
+        replaced = [value.location for load, value in loads.step_values.items() if load.face in kept]
+        for location in (*lists, *replaced):
+            text = f"CalculiX replaces the load of {next(iter(kept.values()))}, which remains in Abaqus"
+            raise location.error(f"{text}: give OP=NEW with both keywords, and repeat the loads that remain")
 
     def _force_components(self, row: Row) -> list[Component]:
         """Return the components on which the nodal force of a line acts."""
@@ -142,7 +190,7 @@ class Conditions:
                 raise row.error(
                     f"{coefficient:g} is the second film coefficient of this face in one step, after {earlier.numbers[0]:g}"
                 )
-            if earlier != film and earlier in histories.tracks and histories.tracks[earlier].in_effect:
+            if earlier != film and histories.keeps(earlier):
                 histories.removals[earlier] = None
             self.film_of[film.keyword, film.face] = film
         return films
@@ -156,12 +204,10 @@ class Conditions:
 
     def _record_supports(self, block: Block, precedes_steps: bool = False) -> None:
         """Record a block *BOUNDARY of the current step or, if `precedes_steps` is true, one that precedes all steps."""
-        kind = block.get("TYPE", "DISPLACEMENT").upper()
-        if kind != "DISPLACEMENT":
-            raise block.error(f"TYPE={kind} is not supported, only DISPLACEMENT")
-        if block.removes_earlier:
-            self.supports.remove_earlier()
-            self.fixed_temperatures.remove_earlier()
+        block.choice("TYPE", ("DISPLACEMENT",))
+        if not precedes_steps:
+            self.supports.begin(block)
+            self.fixed_temperatures.begin(block)
         displaced_before_steps = False
         for row in block.iter_rows():
             if row.text(1) == "11":

@@ -121,8 +121,12 @@ class Histories(Generic[Key]):
         Value in the absence of a load or support of a key without `baseline`.
     time : float
         Total time [time] at the start of the current step.
+    additive : bool
+        Whether CalculiX adds the values that a step sets for one key.
     repeated : list
-        Pairs of values that the current step has set for one key, which must be equal but for round-off.
+        Pairs of values that the current step has set for one key. They must be equal but for round-off, or zero if they add.
+    first_blocks : dict of str to Block
+        First block of the current step by keyword. *DLOAD and *DSLOAD, which form one list in CalculiX, count as one.
     """
 
     content: Content
@@ -134,21 +138,22 @@ class Histories(Generic[Key]):
     fixed_keys: set[Key] = field(default_factory=set)
     default: float = 0.0
     time: float = 0.0
+    additive: bool = False
     repeated: list[tuple[Value, Value]] = field(default_factory=list)
+    first_blocks: dict[str, Block] = field(default_factory=dict)
 
     def set_value(self, key: Key, value: Value) -> None:
         """Set a value for the current step, which `advance` compares with a value that this step has already set."""
         earlier = self.step_values.get(key)
-        if earlier is not None and earlier[:2] != value[:2]:
+        if earlier is not None and ((self.additive and value.value) or earlier[:2] != value[:2]):
             self.repeated.append((earlier, value))
         self.step_values[key] = value
         self.removals.pop(key, None)
         self.fixed_keys.discard(key)
 
     def record(self, block: Block, entries: Iterable[tuple[Iterable[Key], float, Location]]) -> None:
-        """Set the values of the lines of a block; OP=NEW first removes the earlier values of its keyword."""
-        if block.removes_earlier:
-            self.remove_earlier(block.keyword)
+        """Set the values of the lines of a block."""
+        self.begin(block)
         for keys, value, location in entries:
             shared = Value(value, block.get("AMPLITUDE"), location)
             for key in keys:
@@ -163,12 +168,24 @@ class Histories(Generic[Key]):
             self.set_value(key, value)
         self.fixed_keys.add(key)
 
-    def remove_earlier(self, keyword: str = "") -> None:
-        """Mark the values of earlier steps for removal, except those whose keys have a keyword other than `keyword`."""
+    def begin(self, block: Block) -> None:
+        """Begin a block of the current step. With OP=NEW, the earlier values of its keyword are removed.
+
+        Raises CaseError if it has OP=NEW, but not the first block of the step, where CalculiX reads this parameter.
+        """
+        first = self.first_blocks.setdefault(block.keyword.replace("DSLOAD", "DLOAD"), block)
+        if not block.removes_earlier:
+            return
+        if not first.removes_earlier:
+            raise block.error(f"OP=NEW is missing in the first *{first.keyword}, line {first.location.line}")
         self.initial = {}
-        for key, track in self.tracks.items():
-            if track.in_effect and key not in self.step_values and getattr(key, "keyword", keyword) == keyword:
-                self.removals[key] = None
+        earlier = (key for key in self.tracks if getattr(key, "keyword", block.keyword) == block.keyword)
+        self.removals.update(dict.fromkeys(filter(self.keeps, earlier)))
+
+    def keeps(self, key: Key) -> bool:
+        """Whether the value of an earlier step has been neither changed nor removed by the current step so far."""
+        changed = key in self.step_values or key in self.removals
+        return key in self.tracks and self.tracks[key].in_effect and not changed
 
     def advance(self, number: int, step: Step) -> None:
         """Advance to the end of step `number`, counted from 1. Raises CaseError if the step sets two different values."""
@@ -196,13 +213,13 @@ class Histories(Generic[Key]):
         continued = {track: pair for track in self.tracks.values() if (pair := track.value_in_total_time) is not None}
         for track in continued.keys() - changed.values():
             track.add(_amplitude_points(*continued[track], start_factor, start_time, step.period))
-        self.step_values, self.initial, self.removals, self.fixed_keys = {}, {}, {}, set()
+        self.step_values, self.initial, self.removals, self.fixed_keys, self.first_blocks = {}, {}, {}, set(), {}
 
     def _compare_repeated(self, values: Iterable[Value]) -> None:
-        """Raise CaseError if two values of a key differ by more than round-off of the largest of the `values` of the step."""
+        """Raise CaseError if two values of a key add, or differ by more than round-off of the largest of the `values`."""
         round_off = ROUND_OFF * max((abs(value.value) for value in values), default=0.0)
         for earlier, value in self.repeated:
-            if earlier.amplitude != value.amplitude or abs(earlier.value - value.value) > round_off:
+            if self.additive or earlier.amplitude != value.amplitude or abs(earlier.value - value.value) > round_off:
                 raise value.location.error(
                     f"{value.value:.15g} is the second value in this step, after {earlier.value:.15g} in line "
                     f"{earlier.location.line}: programs interpret this differently, so give one value"

@@ -114,9 +114,13 @@ def store(content: Content, current: Interaction, block: Block) -> None:
 def kind_and_friction_of(content: Content, law: Interaction) -> dict[str, Any]:
     """Return the kind, the penalty and the friction of a pair without a cohesive layer."""
     options: dict[str, Any] = {} if law.kind == "unilateral" else {"kind": law.kind}
+    if law.kind == "tied":
+        if law.friction or law.friction_changes:
+            content.note(law, "*FRICTION has no effect in tied contact")
+        return options
     if options and (law.friction or law.friction_changes):
-        raise law.error(f"friction with {law.kind} contact is not supported")
-    if law.penalty is not None and law.kind != "tied":
+        raise law.error("friction with NO SEPARATION is not supported: leave out one of them")
+    if law.penalty is not None:
         options["penalty"] = law.penalty
     options |= _friction_of(law, len(content.steps))
     return options | _friction_heat_of(content, law) if "friction" in options and content.heat else options

@@ -243,6 +243,8 @@ class Reader:
     def read_block(self, block: Block) -> None:
         """Read one block, which closes the open objects to which its keyword cannot belong."""
         keyword, content = block.keyword, self.content
+        if keyword == "RESTART" and "READ" in block.parameters:
+            raise block.error("READ is not supported: give all steps in one deck")
         if keyword in OUTPUT:
             content.outputs.append(block.location)
             return

@@ -28,8 +28,6 @@ from fastcontact.round_off import ROUND_OFF
 
 # A function that adds a load to a model.
 Adder = Callable[[Model], None]
-# Names of groups of loaded facets and solids by the kind of the load; groups of other loads are named "load".
-GROUP_NAMES = {"P": "pressure", "S": "heat flux", "BF": "heat source"}
 
 
 def point_group(model: Model, deck_mesh: DeckMesh, kind: str, points: Iterable[int]) -> str:
@@ -67,8 +65,8 @@ def distributed_loads(deck_mesh: DeckMesh, histories: Histories[Target]) -> list
                 by_shape.add((load.keyword, load.kind, load.numbers, cell), scaled, rows)
     adders: list[Adder] = []
     uniform = chain.from_iterable(_split(group) if group[0][1] == "CENTRIF" else [group] for group in by_shape)
-    for number, ((_, kind, vector, cell), indices, value, table) in enumerate(uniform, start=1):
-        group = f"{GROUP_NAMES.get(kind, 'load')} {number}"
+    for number, ((keyword, kind, vector, cell), indices, value, table) in enumerate(uniform, start=1):
+        group = f"*{keyword} {kind} {number}"
         deck_mesh.groups[group] = {cell: indices.tolist()}
         if any(multiplier for _, multiplier in table):
             adders.append(partial(_add_load, kind=kind, vector=vector, group=group, value=value, table=table))
@@ -124,8 +122,7 @@ def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> d
 
     if kind[0] == "B":
         return {kind[1].lower(): scaled(1.0)}
-    direction = np.array(vector) / np.linalg.norm(vector)
-    return {"xyz"[k]: scaled(float(direction[k])) for k in range(dim) if direction[k]}
+    return {"xyz"[k]: scaled(vector[k]) for k in range(dim) if vector[k]}
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:

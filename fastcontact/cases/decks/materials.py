@@ -34,8 +34,8 @@ def material(content: Content, block: Block) -> Material:
 
 def elastic(content: Content, current: Material, block: Block) -> None:
     """Read *ELASTIC: elastic constants at one temperature; TYPE may be abbreviated to three letters, as in Abaqus."""
-    kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
-    kinds = [name for name in CONSTANTS if len(kind) >= 3 and name.startswith(kind)]
+    kind = "".join(block.get("TYPE", "ISOTROPIC").upper().split())
+    kinds = [name for name in CONSTANTS if len(kind) >= 3 and name.replace(" ", "").startswith(kind)]
     if not kinds:
         names = ", ".join(CONSTANTS)
         raise block.error(f"{current.prefix}TYPE={kind[:40]} is not supported; expected one of {names}")
@@ -86,9 +86,7 @@ def _moduli(values: list[float]) -> Array:
 
 def density(content: Content, current: Material, block: Block) -> None:
     """Read *DENSITY: the mass per volume."""
-    current.density = block.only_row().number(0)
-    if not current.density > 0:
-        raise block.error(f"{current.prefix}the density {current.density:g} must be positive")
+    current.density = block.only_row().positive(0, "density")
 
 
 def plastic(content: Content, current: Material, block: Block) -> None:
@@ -125,9 +123,12 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     terms = as_number(block.location, block.get("N", "1")) if kind == "OGDEN" else 1.0
     if not terms.is_integer() or terms < 1.0:
         raise block.error(f"{current.prefix}the number of terms N = {terms:g} must be a positive whole number")
-    numbers, (n_deviatoric, n_volumetric) = block.numbers(), (count * int(terms) for count in HYPERELASTIC[kind])
+    n_deviatoric, n_volumetric = (count * int(terms) for count in HYPERELASTIC[kind])
+    numbers = [row.number(i, 0.0) for row in block.rows for i in range(len(row.entries))]
     if len(numbers) < n_deviatoric:
         raise block.error(f"{current.prefix}{kind} has {n_deviatoric} constants, {len(numbers)} are given")
+    if len(numbers) > n_deviatoric + n_volumetric + 1:
+        raise block.error(f"{current.prefix}{kind} has {n_deviatoric + n_volumetric} constants, at one temperature")
     constants, (D1, *others) = numbers[:n_deviatoric], [*numbers[n_deviatoric:], 0.0][:n_volumetric]
     if any(others):
         raise block.error(f"{current.prefix}only the compressibility constant D1 is supported")
@@ -250,4 +251,7 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
         "incompatible modes": any(law.incompatible_modes for law in laws),
     }
     reason = next((name for name, applies in reasons.items() if applies), "")
+    if not (reason or content.steps[0].nonlinear):
+        first = next(step for step in content.steps if step.nonlinear)
+        content.note(first, "NLGEOM applies to all steps: finite strains are assumed in the preceding steps, too")
     return ("small" if reason else "finite"), reason

@@ -35,12 +35,9 @@ def static(content: Content, step: Step, block: Block) -> None:
     if "STABILIZE" in block.parameters:
         content.note(block, "STABILIZE has no effect: bodies that are held by contact alone need no damping")
     for row in block.rows[:1]:
-        step.increment = row.number(0, 1.0)
-        step.period = row.number(1, 1.0)
+        step.increment, step.period = row.positive(0, "increment", 1.0), row.positive(1, "length of the step", 1.0)
         for index in (2, 3):
             row.number(index, 1.0)
-        if not (step.period > 0 and step.increment > 0):
-            raise row.error("the increment and the length of the step must be positive")
 
 
 def heat_procedure(content: Content, step: Step, block: Block) -> None:
@@ -117,10 +114,8 @@ def amplitude(content: Content, block: Block) -> None:
 
 def initial_conditions(content: Content, block: Block) -> None:
     """Store a block *INITIAL CONDITIONS, which gives nodal temperatures or element stresses before the first step."""
-    kind = " ".join(block.required("TYPE").upper().split())
-    if kind not in ("TEMPERATURE", "STRESS"):
-        raise block.error(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
-    content.blocks[f"INITIAL {kind}"].append(block)
+    block.required("TYPE")
+    content.blocks[f"INITIAL {block.choice('TYPE', ('TEMPERATURE', 'STRESS'))}"].append(block)
 
 
 # Keywords of heat loads.

@@ -197,11 +197,7 @@ MISTAKES = {
             '"CONT2"\nsurface_smoothing = 0',
             r"'contact.hertz.surface_smoothing' must be true or false, not 0",
         ),
-        (
-            "nu = 0.3",
-            "nu = 0.3\nincompatible_modes = 1",
-            r"'material\[0\].incompatible_modes' must be true or false, not 1",
-        ),
+        ("nu = 0.3", "nu = 0.3\nincompatible_modes = 1", r"'material\[0\].incompatible_modes' must be true or false"),
         ("geometry_updates = 2", "keep_pairing = 1", r"'solve.keep_pairing' must be true or false, not 1"),
     ],
     LOADED: [

@@ -178,6 +178,7 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
         ("STATE\n", "STATE\n*RADIATE\nup, R1, 2.\n", r"\*RADIATE: .*without radiation"),
         ("STATE\n", "STATE\n*FILM\nup, F2NU, 2., 3.\n", r"\*FILM: F2NU is not supported; expected one of F1, F2"),
         ("STATE\n", "STATE\n*DFLUX\nup, S9, 2.\n", r"\*DFLUX: element 4 of type DC3D8 has no face 9"),
+        ("STATE\n", "STATE\n*CFLUX\nHOT, 11, 2.\nHOT, 11, 2.\n", r"\*CFLUX: 2 is the second value in this step"),
         ("STATE\n", "STATE\n*CFLUX\nHOT, 3, 2.\n", r"\*CFLUX: degree of freedom 3 is not 11"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n1000., 0., 20.\n2000., 1., 50.\n", r"depends on the temperature"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n1000., 1.\n2000., 1.\n", r"\*GAP CONDUCTANCE: .* ascend"),

@@ -91,9 +91,8 @@ def test_supports_along_skew_axes(tmp_path):
     (step,) = deck.solve()
     assert np.ptp(step.displacement[[deck.point(15), deck.point(16)], 2]) < 1e-14
     assert step.reaction[deck.points_of("bottom")].sum(axis=0) @ SKEW == pytest.approx(100.0 * np.sqrt(2.0))
-    assert (
-        np.abs(step.reaction[[deck.point(15), deck.point(16)], 2]).max() < 1e-7
-    )  # forces of the equation are no reactions
+    # Forces of the equation are no reactions.
+    assert np.abs(step.reaction[[deck.point(15), deck.point(16)], 2]).max() < 1e-7
 
 
 def test_two_couplings_share_the_rotation_of_a_node(tmp_path):
@@ -290,9 +289,18 @@ def test_no_separation_holds_what_was_once_closed(tmp_path):
     assert forces == pytest.approx([100.0, -40.0])
 
 
-def test_stabilisation_is_noted(tmp_path):
-    deck = deck_of(tmp_path, WHOLE.replace("*Static\n", "*Static, stabilize=0.0002\n"))
-    assert "STABILIZE has no effect" in notes_of(deck)
+@pytest.mark.parametrize(
+    ("old", "new", "said"), [
+        ("*Static\n", "*Static, stabilize=0.0002\n", "STABILIZE has no effect"),
+        (
+            "=si\n",
+            "=si\n*Surface Behavior, pressure-overclosure=TIED\n1.\n*Friction\n0.1\n",
+            "no effect in tied contact",
+        ),
+        (STEP, STEP + STEP.replace("*Step", "*Step, nlgeom"), "NLGEOM applies to all steps: finite strains"),
+    ])  # fmt: skip
+def test_what_has_no_or_a_wider_effect_is_noted(tmp_path, old, new, said):
+    assert said in notes_of(deck_of(tmp_path, WHOLE.replace(old, new, 1)))
 
 
 def test_temperatures_of_nodes_that_each_go_their_own_way(tmp_path):

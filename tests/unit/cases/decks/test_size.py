@@ -152,8 +152,7 @@ TURNED = "*Transform, nset=seven\n1., 1., 0., -1., 1., 0.\n"
 TOP = "*Surface, name=top\n2, S2\n"
 # Loads of three cubes on each other's side, and what they add up to along x, or y.
 ADDED = {
-    "of elements and a set": ("*Dload\n1, BX, 2.\n2, BX, 3.\nall, BX, 2.\n", 0, (4.0, 5.0, 2.0)),
-    "of elements alike": ("*Dload\n1, BX, 2.\nall, BX, 2.\n", 0, (4.0, 2.0, 2.0)),
+    "of elements and a set": ("*Dload\n1, GRAV, 2., 1., 0., 0.\nall, BX, 2.\n", 0, (22.0, 2.0, 2.0)),
     "gravity": ("*Dload\n1, GRAV, 2., 3., 0., 0.\n2, GRAV, 6., 1., 0., 0.\n", 0, (20.0, 60.0, 0.0)),
     "centrifugal": ("*Dload\n" + "".join(f"{k}, CENTRIF, {k / 100}, 0., 0., 0., 0., 0., 1.\n" for k in (1, 2, 3)), 0,
                     (0.05, 0.5, 1.35)),

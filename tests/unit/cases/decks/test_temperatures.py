@@ -165,7 +165,7 @@ def test_axes_of_a_material_and_other_types_are_refused(tmp_path):
     turned = "*Orientation, name=o\n0., 1., 0., -1., 0., 0.\n*Solid Section, elset=low, orientation=o,"
     text = stressed("low, 20., 0., 0., 0., 0., 0.\n", ("*Solid Section, elset=low,", turned))
     refused(fc.CaseError, r"element 1 has an \*ORIENTATION", deck_of, tmp_path, text)
-    with pytest.raises(fc.CaseError, match="TYPE=VELOCITY is not supported, only TEMPERATURE and STRESS"):
+    with pytest.raises(fc.CaseError, match="TYPE=VELOCITY is not supported; expected one of TEMPERATURE, STRESS"):
         deck_of(tmp_path, stressed("low, 1.\n", ("type=STRESS", "type=VELOCITY")))
     with pytest.raises(fc.CaseError, match="GEOSTATIC"):
         deck_of(tmp_path, stressed("low, 1.\n", ("type=STRESS", "type=STRESS, GEOSTATIC")))
