@@ -60,16 +60,18 @@ MEAN_DILATATION = 'give the material volumetric="mean_dilatation"'
 SIMPLICES = ("tri3", "tet4")
 
 
-def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Sequence[str]) -> tuple[float, float, float]:
+def _stress_scatter(
+    problem: Problem, state: State, step: StepResult, names: Sequence[str]
+) -> tuple[float, float, float]:
     """Return by how much stresses, and mean stresses, in the elements `names` differ from recovered ones [-].
 
     The first is the energy norm of the difference between recovered and computed stress of all bodies, over that of the
     computed one, where bodies yield over the root of twice the elastic and plastic work: the residual stresses of unloaded
     bodies scatter by 72 % about recovered ones even where eight cells across a beam represent bending well.
 
-    The second is the largest of this ratio and, unless bodies yield, those of single bodies with a notable part of the energy.
-    The third is the same as the first for the root mean square of the mean stress in nearly incompressible triangles and
-    tetrahedra.
+    The second is the largest of this ratio and, unless bodies yield, those of single bodies with a notable part of the
+    energy. The third is the same as the first for the root mean square of the mean stress in nearly incompressible triangles
+    and tetrahedra.
     """
     model, field, mesh = problem.model, problem.field, problem.model.mesh
     thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
@@ -157,15 +159,17 @@ def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[
             f"{simplices} cells lock: {material} their mean stress scatters by {mean_stress:.0%} about its averages at the "
             f"nodes, and {effect}; {OTHER_ELEMENTS}"
         ]
-    if max(total**2 / WARNING_ERROR, energy / BENDING) > 1.0 and model.kinematics != "axisymmetric":  # stresses at the axis scatter in any case
+    if (
+        max(total**2 / WARNING_ERROR, energy / BENDING) > 1.0 and model.kinematics != "axisymmetric"
+    ):  # stresses at the axis scatter in any case
         projected = any(elements.get(name).dilatation is not None for name in names)
         soft = " or, with their mean dilatation, too soft" if projected and problem.field.averaged.any() else ""
         modes = "hexahedra or quadrangles with LinearElastic(incompatible_modes=True), " if linear else ""
+        bent = ", as in thin parts that bend" if energy > BENDING else ""
         return [
-            f"{' and '.join(names)} cells are too stiff{soft}{', as in thin parts that bend' if energy > BENDING else ''}: the "
-            f"error of their stress is {energy:.0%} (energy norm of the difference from stress recovered at the nodes), and "
-            f"that of forces or displacements about {total**2:.0%}; use {modes}quadratic elements (generate.to_quadratic), or "
-            "smaller ones"
+            f"{' and '.join(names)} cells are too stiff{soft}{bent}: the error of their stress is {energy:.0%} (energy norm "
+            f"of the difference from stress recovered at the nodes), and that of forces or displacements about "
+            f"{total**2:.0%}; use {modes}quadratic elements (generate.to_quadratic), or smaller ones"
         ]
     return []
 

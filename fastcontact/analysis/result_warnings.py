@@ -223,10 +223,10 @@ def _energy_imbalance(state: State) -> Iterator[str]:
     work, round_off = state.work, LENGTH_ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
     if work is not None and abs(work.imbalance) > 2 * NOTABLE * work.largest and work.largest > round_off:
         yield (
-            f"the energy of these load steps is out of balance by {work.imbalance:.3g}: the external work is "
-            f"{work.external:.4g}, the strain energy {work.strain_energy:.4g}, and the frictional work {work.friction:.4g}. The "
-            f"imbalance is {abs(work.imbalance) / work.largest:.1%} of the largest energy so far. If energies matter, use more load steps. If the contact area moves along the secondary side, exchange the "
-            "sides instead, or use smaller facets"
+            f"the energy of these load steps is out of balance by {work.imbalance:.3g}, "
+            f"{abs(work.imbalance) / work.largest:.1%} of the largest energy so far (external work {work.external:.4g}, "
+            f"strain energy {work.strain_energy:.4g}, frictional work {work.friction:.4g}). If energies matter, use more "
+            "load steps. If the contact area moves along the secondary side, exchange the sides, or use smaller facets"
         )
 
 

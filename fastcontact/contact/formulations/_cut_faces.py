@@ -30,8 +30,8 @@ REACH = 3.0
 # Work per secondary facet in the units of `parallel.portions`, which choose the number of threads. A unit takes about 10 ns,
 # and a facet 5 us (tri3) to 70 us (quad8).
 EFFORT = 400
-# Curved facets whose mean normals are inclined to each other may be folded in the projection, where the folded part faces away.
-# If the cosine of their normals is below this value, only facets that are distorted in their own planes are folded.
+# Curved facets that are inclined to each other may be folded in the projection: a part of them faces away and is omitted. If
+# the cosine of their normals is below this value, only facets that are distorted in their own planes are folded.
 OPPOSED = -0.7
 
 
@@ -213,10 +213,12 @@ def _integrals(
     parallel.parallel_map(lambda span: _cut_faces_kernels.integrate(*span, *arguments), spans)
     opposed = np.einsum("nd,nd->n", secondary.axes[pairs[:, 0], 2], primary.axes[pairs[:, 1], 2]) < OPPOSED
     if (distorted := folded & opposed).any():
-        first, second = (side.origin[row] for side, row in zip((secondary, primary), pairs[distorted.argmax()], strict=True))
+        first, second = (
+            side.origin[row] for side, row in zip((secondary, primary), pairs[distorted.argmax()], strict=True)
+        )
         raise ContactError(
-            f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there, exchange the sides, or "
-            "use formulation 'continuous'"
+            f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there, exchange the sides, "
+            "or use formulation 'continuous'"
         )
     sum_over_pairs = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
     mass_of_facets = (sum_over_pairs @ mass.reshape(-1, k * k)).reshape(-1, k, k)

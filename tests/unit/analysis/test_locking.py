@@ -95,7 +95,9 @@ def test_thin_parts_bend_right_or_it_is_told(name, n, modes, told):
     assert (deflection < 0.7) if told else (0.97 < deflection < 1.0)
 
 
-@pytest.mark.parametrize(("name", "n", "told"), [("tet4", 2, True), ("tet4", 4, False), ("wedge6", 2, True), ("hex8", 3, False)])
+@pytest.mark.parametrize(
+    ("name", "n", "told"), [("tet4", 2, True), ("tet4", 4, False), ("wedge6", 2, True), ("hex8", 3, False)]
+)
 def test_a_coarse_mesh_is_told_with_a_figure_of_the_right_size(name, n, told):
     """The force on a pad that is pressed between bonded plates, for which quadratic elements are nearly exact."""
     forces = []
