@@ -379,8 +379,7 @@ def integrate(
         _flatten(deformed[s], n, 1, origin[s], axes[s], flat)  # coefficients: only the first is a position
         _flatten(other_deformed[p], m, 1, origin[s], axes[s], other_flat)
         count = _overlap(secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare)
-        for d in range(2):
-            xi[d], other_xi[d] = middle[d], other_middle[d]
+        xi[:], other_xi[:] = middle, other_middle
         ox, oy = (subject[0, 0], subject[0, 1]) if exact else _centroid(subject, count)
         for k in range(1 if exact else 0, count - 1 if exact else count):
             successor = (k + 1) % count
@@ -395,8 +394,7 @@ def integrate(
                 projected_area = _locate(flat, x, y, xi, terms)
                 if projected_area == 0.0 or _locate(other_flat, x, y, other_xi, other_terms) == 0.0:
                     folded[i] = True
-                    for d in range(2):
-                        xi[d], other_xi[d] = middle[d], other_middle[d]
+                    xi[:], other_xi[:] = middle, other_middle
                     continue
                 _fill_shape(to_terms, terms, shape)
                 _fill_shape(other_to_terms, other_terms, other_shape)
