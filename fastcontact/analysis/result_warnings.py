@@ -382,7 +382,7 @@ def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> 
         yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
     if count := _too_few_elements(pair, contact, state):
         needed, remedy = f"its pressure needs {MIN_ELEMENTS_ACROSS_RADIUS} or more", f"refine '{pair.secondary.group}'"
-        gap = np.where(contact.active, contact.gap, 0.0).clip(0.0)
+        gap = np.where(contact.active & np.isfinite(contact.gap), contact.gap, 0.0).clip(0.0)
         if state.work and contact.normal_forces @ gap > WARNING_RATIO * state.work.largest:
             # Between a fillet and large facets of a plane, forces are twice as large as with exchanged sides.
             needed += (
