@@ -49,8 +49,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SUM_ROUND_OFF
 # accurate, by 38 to 47 % at 0.45 and by 66 to 75 % at 0.48, where the errors of the pressure at the pole are 15 to 27 % and
 # 27 to 43 %.
 SUSPICIOUS, ALTERNATING = 0.45, 0.25
-# Estimated error in the energy norm above which a warning is given. It is 25 % under the same sphere on coarse triangles, and
-# 52 to 67 % in thin parts that carry a third of the exact load in bending.
+# Estimated error in the energy norm of parts that bend. It is 52 to 67 % in thin parts that carry a third of the exact load.
+# Elsewhere a warning is given if its square, the relative error of the stiffness, exceeds WARNING_ERROR: a pad of tetrahedra,
+# whose force is 9 % too large, has an error of 25 %.
 BENDING = 0.45
 # Remedies for elements that lock with any kind of integration, and for other elements.
 OTHER_ELEMENTS = "use quadrangles or hexahedra, or quadratic elements (generate.to_quadratic)"
@@ -59,21 +60,24 @@ MEAN_DILATATION = 'give the material volumetric="mean_dilatation"'
 SIMPLICES = ("tri3", "tet4")
 
 
-def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Sequence[str]) -> tuple[float, float]:
+def _stress_scatter(
+    problem: Problem, state: State, step: StepResult, names: Sequence[str]
+) -> tuple[float, float, float]:
     """Return by how much stresses, and mean stresses, in the elements `names` differ from recovered ones [-].
 
-    The first is the energy norm of the difference between recovered and computed stress, over that of the computed one. It is
-    the largest of the ratios of all bodies together and of single bodies with a notable part of the energy. Where bodies
-    yield, it is the ratio of all bodies, relative to the root of twice the elastic and plastic work: the residual stresses of
-    unloaded bodies scatter by 72 % about recovered ones even where eight cells across a beam represent bending well.
+    The first is the energy norm of the difference between recovered and computed stress of all bodies, over that of the
+    computed one, where bodies yield over the root of twice the elastic and plastic work: the residual stresses of unloaded
+    bodies scatter by 72 % about recovered ones even where eight cells across a beam represent bending well.
 
-    The second is the same for the root mean square of the mean stress in nearly incompressible triangles and tetrahedra.
+    The second is the largest of this ratio and, unless bodies yield, those of single bodies with a notable part of the
+    energy. The third is the same as the first for the root mean square of the mean stress in nearly incompressible triangles
+    and tetrahedra.
     """
     model, field, mesh = problem.model, problem.field, problem.model.mesh
     thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
     offset = model.stress_offset(thermal, initial, field, step.temperature)
     if not names or (offset is not None and problem.bodies is None):  # free expansion only causes round-off stresses
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     stress: CellStress | PointStress
     plastic_work, largest_work = 0.0, state.work.largest if state.work else 0.0
     if problem.bodies is None:
@@ -90,12 +94,13 @@ def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Seq
     energy_scale = strain * np.sqrt(field.moduli.max() * np.prod(size))
     negligible_energy = max(LENGTH_ROUND_OFF * energy_scale, np.sqrt(LENGTH_ROUND_OFF * largest_work))
     if strain <= SUM_ROUND_OFF or energy <= negligible_energy:
-        return 0.0, 0.0
-    ratio = float(difference / np.sqrt(energy**2 + 2.0 * plastic_work))
+        return 0.0, 0.0, 0.0
+    ratio = total = float(difference / np.sqrt(energy**2 + 2.0 * plastic_work))
     if not plastic_work:  # a thin part may bend on a body that stores more energy
         notable = sums[sums[:, 1] > WARNING_RATIO * energy**2]
         ratio = float(np.sqrt(notable[:, 0] / notable[:, 1]).max(initial=ratio))
-    return ratio if offset is None else 0.0, float(mean_difference / mean) if mean > 0.0 else 0.0
+    mean_stress = float(mean_difference / mean) if mean > 0.0 else 0.0
+    return (total, ratio, mean_stress) if offset is None else (0.0, 0.0, mean_stress)
 
 
 def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name: str, recovered: Array) -> Array:
@@ -141,7 +146,7 @@ def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[
     have_modes = all(material.incompatible_modes for material, _ in model.materials)
     bending = ELEMENTS_WITH_MODES if have_modes else ()
     names = [name for name in model.mesh.solids if elements.get(name).order == 1 and name not in bending]
-    energy, mean_stress = _stress_scatter(problem, state, step, names)
+    total, energy, mean_stress = _stress_scatter(problem, state, step, names)
     if mean_stress > ALTERNATING:
         simplices = " and ".join(name for name in names if name in SIMPLICES)
         material, effect = "in a nearly incompressible material", "forces are too large"
@@ -152,14 +157,17 @@ def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[
             f"{simplices} cells lock: {material} their mean stress scatters by {mean_stress:.0%} about its averages at the "
             f"nodes, and {effect}; {OTHER_ELEMENTS}"
         ]
-    if energy > BENDING and model.kinematics != "axisymmetric":  # stresses at the axis scatter in any case
+    if (
+        max(total**2 / WARNING_ERROR, energy / BENDING) > 1.0 and model.kinematics != "axisymmetric"
+    ):  # stresses at the axis scatter in any case
         projected = any(elements.get(name).dilatation is not None for name in names)
         soft = " or, with their mean dilatation, too soft" if projected and problem.field.averaged.any() else ""
         modes = "hexahedra or quadrangles with LinearElastic(incompatible_modes=True), " if linear else ""
+        bent = ", as in thin parts that bend" if energy > BENDING else ""
         return [
-            f"{' and '.join(names)} cells are too stiff{soft}, as in thin parts that bend: the error of their stress is "
-            f"{energy:.0%} (energy norm of the difference from stress recovered at the nodes); use {modes}quadratic "
-            "elements (generate.to_quadratic), or smaller ones"
+            f"{' and '.join(names)} cells are too stiff{soft}{bent}: the error of their stress is {energy:.0%} (energy norm "
+            f"of the difference from stress recovered at the nodes), and that of forces or displacements about "
+            f"{total**2:.0%}; use {modes}quadratic elements (generate.to_quadratic), or smaller ones"
         ]
     return []
 

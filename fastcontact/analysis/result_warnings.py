@@ -223,23 +223,23 @@ def _energy_imbalance(state: State) -> Iterator[str]:
     work, round_off = state.work, LENGTH_ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
     if work is not None and abs(work.imbalance) > 2 * NOTABLE * work.largest and work.largest > round_off:
         yield (
-            f"the energy of these load steps is out of balance: {work.imbalance:.3g} of the external work "
-            f"{work.external:.4g} is neither strain energy ({work.strain_energy:.4g}), nor frictional work "
-            f"({work.friction:.4g}), nor energy of penalties, {abs(work.imbalance) / work.largest:.1%} of the largest of "
-            "them. If energies matter, use more load steps. If the contact area moves along the secondary side, exchange the "
-            "sides instead, or use smaller facets"
+            f"the energy of these load steps is out of balance by {work.imbalance:.3g}, "
+            f"{abs(work.imbalance) / work.largest:.1%} of the largest energy so far (external work {work.external:.4g}, "
+            f"strain energy {work.strain_energy:.4g}, frictional work {work.friction:.4g}). If energies matter, use more "
+            "load steps. If the contact area moves along the secondary side, exchange the sides, or use smaller facets"
         )
 
 
 def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
     """Yield a warning if nodes that close and slide in one step, or slide until contact is lost, do much frictional work.
 
-    Their work must also exceed NOTABLE squared times the largest energy, which is the energy of a relative error NOTABLE of
-    the displacement. Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy
-    in large steps, and 1e-5 if slip is measured from first contact.
+    Their work must also exceed NOTABLE squared times the largest energy in steps with friction, which is the energy of a
+    relative error NOTABLE of the displacement: without friction, hot bodies store energy of free expansion. Under a sphere
+    that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in large steps, and 1e-5 if slip
+    is measured from first contact.
     """
     work = state.work
-    if work is not None and work.touching > max(WARNING_RATIO * work.friction, NOTABLE**2 * work.largest, 0.0):
+    if work is not None and work.touching > max(WARNING_RATIO * work.friction, NOTABLE**2 * work.largest_sliding, 0.0):
         fraction = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         hint = "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
         yield (
@@ -382,6 +382,13 @@ def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> 
         yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
     if count := _too_few_elements(pair, contact, state):
         needed, remedy = f"its pressure needs {MIN_ELEMENTS_ACROSS_RADIUS} or more", f"refine '{pair.secondary.group}'"
+        gap = np.where(contact.active & np.isfinite(contact.gap), contact.gap, 0.0).clip(0.0)
+        if state.work and contact.normal_forces @ gap > WARNING_RATIO * state.work.largest:
+            # Between a fillet and large facets of a plane, forces are twice as large as with exchanged sides.
+            needed += (
+                f" (its force is too large, since it acts across gaps of up to {gap.max():.3g} between large facets)"
+            )
+            remedy += "" if isinstance(pair.primary, RigidSide) else " or exchange the sides"
         if count == 1:
             friction = ", its direction and the work of friction" if pair.friction else " and its direction"
             needed += f", and with fewer than 2 the force{friction} may be inaccurate, too"

@@ -152,6 +152,8 @@ class Work:
         Work of contact pressures on the increases of the wear depths.
     largest : float
         The largest of these values in all steps so far.
+    largest_sliding : float
+        The largest of these values in all steps with frictional work.
     plastic : float
         Plastic work.
     """
@@ -162,6 +164,7 @@ class Work:
     imbalance: float = 0.0
     stored: float = 0.0
     largest: float = 0.0
+    largest_sliding: float = 0.0
     plastic: float = 0.0
     released: float = 0.0
     wear: float = 0.0
@@ -194,8 +197,9 @@ class Work:
         friction, touching, contact = added
         sums = self.friction + friction, self.touching + touching, self.imbalance + contact - wear
         work = Work(energy[0], *sums, stored, plastic=energy[1], released=released, wear=self.wear + wear)
-        terms = (self.largest, *energy, work.friction, abs(work.external))
-        return replace(work, largest=max(terms))
+        now = max(*energy, work.friction, abs(work.external))
+        sliding = max(self.largest_sliding, now) if friction else self.largest_sliding
+        return replace(work, largest=max(self.largest, now), largest_sliding=sliding)
 
     def as_dict(self) -> dict[str, float]:
         """Return these values under the names of `StepResult.work` [energy]."""

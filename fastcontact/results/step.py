@@ -114,8 +114,9 @@ def warnings_of_run(warnings: Iterable[str], iterations: Mapping[str, Any]) -> l
     return [text for text in warnings if text not in notes]
 
 
-# Fraction of the sum of the normal forces below which the resultant of a contact is negligible.
-NEGLIGIBLE = 1e-3
+# Fractions of the sum of the normal forces below which the resultant of a contact is negligible, and below which the sum is
+# printed with it. The resultant is 0.90 of the sum on a quarter of a press fit.
+NEGLIGIBLE, INCLINED = 1e-3, 0.95
 
 
 def force_text(force: Sequence[float], parts: Sequence[float], normal_force: float, units: Mapping[str, str]) -> str:
@@ -124,16 +125,18 @@ def force_text(force: Sequence[float], parts: Sequence[float], normal_force: flo
     `parts` are `ContactResult.force_parts` [force]. With friction the further values are the normal and the tangential part.
     Without friction they are the components of the vector `force` (dim,) [force], unless it is parallel to an axis: in a half
     model, one of them is the component normal to the plane of symmetry, which the other half balances. If the nodal normal
-    forces balance each other, their sum `normal_force` [force] is appended instead.
+    forces partly balance each other, their sum `normal_force` [force] is appended, and if they balance completely it is the
+    only one of these values.
     """
     total, normal, tangential, normal_sum = (value_text(part, units, "force", 6) for part in (*parts, normal_force))
+    suffix = f", sum of normal forces {normal_sum}" if min(parts[:2]) < INCLINED * normal_force else ""
     if parts[0] < NEGLIGIBLE * normal_force:
-        return f"{total}, sum of normal forces {normal_sum}"
+        return total + suffix
     if parts[2] > LENGTH_ROUND_OFF * parts[0]:
-        return f"{total} (normal {normal}, tangential {tangential})"
+        return f"{total} (normal {normal}, tangential {tangential}){suffix}"
     along_an_axis = f"{max(map(abs, force)):.6g}" == f"{parts[0]:.6g}"
     components = ", ".join(f"{axis} {part:.6g}" for axis, part in zip("xyz", force, strict=False))
-    return total if along_an_axis else f"{total} ({components})"
+    return f"{total}{'' if along_an_axis else f' ({components})'}{suffix}"
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:

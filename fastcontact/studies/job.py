@@ -24,9 +24,9 @@ import numpy as np
 from fastcontact._jit import decorators as _jit
 from fastcontact._version import __version__
 from fastcontact.analysis.run import solve, solve_steps
-from fastcontact.cases.case import Case, build_case, digest, referenced_files
+from fastcontact.cases.case import Case, build_case, digest, referenced_files, stored_description
 from fastcontact.contact.formulations import FORMULATIONS
-from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
+from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning, warn
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.fingerprint import digest_of_mesh
 from fastcontact.model.model import Model
@@ -125,8 +125,14 @@ class Job(Run):
         return {"data": data, "pair": self.pair, "recipe": self.recipe}
 
     def solve_run(self) -> tuple[Case, list[StepResult]]:
-        """See `Run`."""
-        case = build_case(self.data, name=self.name, folder=self.folder, mesh=make_mesh(self.recipe, self.base))
+        """See `Run`. If the theory is not defined for the values of this run, the case is solved without it."""
+        data = self.data
+        try:
+            stored_description(data)
+        except FastcontactError as error:
+            warn(f"there is no theory here: {error}")
+            data = {key: value for key, value in data.items() if key not in ("theory", "check")}
+        case = build_case(data, name=self.name, folder=self.folder, mesh=make_mesh(self.recipe, self.base))
         return case, [last_step(case)]
 
 

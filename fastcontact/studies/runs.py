@@ -350,8 +350,9 @@ def parameter_sweep(
     job_of_choice = partial(_job, case, element=element, formulation=formulation, level=level)
     jobs = [job_of_choice(choice) for choice in choices]
     check_swept_keys(choices, jobs, partial(job_of_choice, sized=False), data_of(case))
-    # The first case is built in advance, because an invalid key would make every run fail.
-    build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
+    # The first case, or the first with a theory, is built in advance, because an invalid key would make every run fail.
+    first = next((job for job in jobs if _theory_at(job.data, job.pair)), jobs[0])
+    build_case(first.data, name=case.name, folder=case.folder, mesh=case.mesh)
     results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
         **report_fields(case),

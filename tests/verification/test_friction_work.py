@@ -400,6 +400,12 @@ def test_the_share_of_work_while_touching_is_at_most_all_of_it(friction):
     assert text.startswith("100% of the work of friction")
 
 
+def test_the_energy_of_hot_bodies_before_contact_does_not_hide_work_while_touching():
+    work = Work().after((1e6, 0.0), 0.0, (0.0, 0.0, 0.0)).after((6e3, 0.0), 0.0, (300.0, 60.0, 0.0))
+    (text,) = _slip_before_contact(fc.Criteria(), State(np.zeros(2), 0.0, work=work))
+    assert text.startswith("20% of the work of friction")
+
+
 def test_no_work_of_friction_is_not_told_where_the_strain_energy_is_round_off():
     assert not [*_slip_before_contact(fc.Criteria(), State(np.zeros(2), 0.0, work=Work(-1e-30, 0.0, 0.0)))]
 

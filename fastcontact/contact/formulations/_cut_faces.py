@@ -30,6 +30,9 @@ REACH = 3.0
 # Work per secondary facet in the units of `parallel.portions`, which choose the number of threads. A unit takes about 10 ns,
 # and a facet 5 us (tri3) to 70 us (quad8).
 EFFORT = 400
+# Curved facets that are inclined to each other may be folded in the projection: a part of them faces away and is omitted. If
+# the cosine of their normals is below this value, only facets that are distorted in their own planes are folded.
+OPPOSED = -0.7
 
 
 def face_overlap(
@@ -195,6 +198,7 @@ def _integrals(
     n, k = secondary.block.facets.shape
     mass, integrals = np.empty((len(pairs), k, k)), np.empty((len(pairs), k, opposite.n_nodes))
     gap_reduction, start = np.empty((n, k)), np.searchsorted(pairs[:, 0], np.arange(n + 1))
+    folded = np.zeros(len(pairs), bool)
     degree = polynomial_degree(element.n_nodes) + polynomial_degree(max(element.n_nodes, opposite.n_nodes))
     # Between triangles the quadrature is exact, so that the result does not depend on the choice of a first corner.
     if element.n_nodes == opposite.n_nodes == 3:
@@ -203,13 +207,19 @@ def _integrals(
         start, secondary.nodes, secondary.n_corners, secondary.origin, secondary.axes,
         to_terms @ secondary.nodes, to_terms @ reference[secondary.block.facets], to_terms, _centre(element),
         primary.nodes, primary.n_corners, opposite_to_terms @ primary.nodes, opposite_to_terms, _centre(opposite),
-        pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, gap_reduction,
+        pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, gap_reduction, folded,
     )  # fmt: skip
     spans = parallel.portions(n, EFFORT)
-    failed = parallel.parallel_map(lambda span: _cut_faces_kernels.integrate(*span, *arguments), spans)
-    if max(failed) >= 0:
-        first, second = (side.origin[row] for side, row in zip((secondary, primary), pairs[max(failed)], strict=True))
-        raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
+    parallel.parallel_map(lambda span: _cut_faces_kernels.integrate(*span, *arguments), spans)
+    opposed = np.einsum("nd,nd->n", secondary.axes[pairs[:, 0], 2], primary.axes[pairs[:, 1], 2]) < OPPOSED
+    if (distorted := folded & opposed).any():
+        first, second = (
+            side.origin[row] for side, row in zip((secondary, primary), pairs[distorted.argmax()], strict=True)
+        )
+        raise ContactError(
+            f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there, exchange the sides, "
+            "or use formulation 'continuous'"
+        )
     sum_over_pairs = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
     mass_of_facets = (sum_over_pairs @ mass.reshape(-1, k * k)).reshape(-1, k, k)
     coupling = Coupling(secondary.block, primary.block, pairs, integrals, -secondary.axes[:, 2])

@@ -326,7 +326,7 @@ def _symmetrise(mass):
 def integrate(
     low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
     primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
-    factor, mass, coupling, gap_reduction,
+    factor, mass, coupling, gap_reduction, folded,
 ):  # fmt: skip
     """Integrate products of shape functions over the segments of the secondary facets `low` to ``high - 1``.
 
@@ -364,11 +364,8 @@ def integrate(
         Filled with integrals of secondary times primary shape functions [area].
     gap_reduction : (n_facets, n_nodes)
         Filled with integrals of secondary shape functions times the sum of both heights [volume].
-
-    Returns
-    -------
-    int
-        -1, or the number of a pair with a facet that is too distorted to be projected.
+    folded : (n_pairs,)
+        Set where a point of the overlap has no counterpart on one of the facets. This point is omitted.
     """
     capacity = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
     subject, window, spare = np.empty((capacity, 2)), np.empty((capacity, 2)), np.empty((capacity, 2))
@@ -382,8 +379,7 @@ def integrate(
         _flatten(deformed[s], n, 1, origin[s], axes[s], flat)  # coefficients: only the first is a position
         _flatten(other_deformed[p], m, 1, origin[s], axes[s], other_flat)
         count = _overlap(secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare)
-        for d in range(2):
-            xi[d], other_xi[d] = middle[d], other_middle[d]
+        xi[:], other_xi[:] = middle, other_middle
         ox, oy = (subject[0, 0], subject[0, 1]) if exact else _centroid(subject, count)
         for k in range(1 if exact else 0, count - 1 if exact else count):
             successor = (k + 1) % count
@@ -397,7 +393,9 @@ def integrate(
                 y = oy + points[q, 0] * uy + points[q, 1] * vy
                 projected_area = _locate(flat, x, y, xi, terms)
                 if projected_area == 0.0 or _locate(other_flat, x, y, other_xi, other_terms) == 0.0:
-                    return i
+                    folded[i] = True
+                    xi[:], other_xi[:] = middle, other_middle
+                    continue
                 _fill_shape(to_terms, terms, shape)
                 _fill_shape(other_to_terms, other_terms, other_shape)
                 area = weights[q] * twice_area * _area_density(reference[s], terms) / projected_area
@@ -408,4 +406,3 @@ def integrate(
                     for a in range(n):
                         gap_reduction[s, a] += area * rise * shape[a]
     _symmetrise(mass[start[low] : start[high]])
-    return -1

@@ -130,7 +130,7 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
     points = mesh.points * scale
     if number("rotate", rotate) != 0.0:
         if mesh.dim != 2:
-            raise MeshError("rotate turns 2D meshes only: rotate the points of a 3D mesh with Mesh.replace")
+            raise MeshError("rotate turns 2D meshes only: in 3D, use mesh.replace(points=mesh.points @ R.T)")
         cosine, sine = np.cos(np.radians(rotate)), np.sin(np.radians(rotate))
         points = points @ np.array([[cosine, sine], [-sine, cosine]])
     if translate is not None:

@@ -281,6 +281,23 @@ def test_contacts_smaller_than_a_facet_have_inaccurate_forces():
     assert "its direction and the work of friction may be inaccurate" in rough
 
 
+def test_forces_across_gaps_between_large_facets_are_told():
+    """A pad with rounded corners on a coarse plane: exchanged sides have the force of fine meshes, 11.6."""
+    pad, plane = block((8.0, 3.0), (32, 8)), block((16.0, 4.0), (12, 4), origin=(-4.3, -4.0))
+    x, y = pad.points.T
+    bottom = 1.5 - np.sqrt(1.5**2 - (1.5 - np.minimum(np.minimum(x, 8.0 - x), 1.5)) ** 2)
+    mesh = united(U_=pad.replace(points=np.column_stack([x, bottom + (3.0 - bottom) * y / 3.0])), L_=plane)
+    forces = []
+    for sides, told in ((("U_BOTTOM", "L_TOP"), False), (("L_TOP", "U_BOTTOM"), True)):
+        model = elastic_model(mesh, "plane_strain", L_BOTTOM="xy", U_TOP={"x": 0.0, "y": -0.01})
+        model.add_contact("pad", secondary=sides[0], primary=sides[1])
+        step, texts = last_step(model, about="acts across gaps of up to")
+        assert [text.endswith("refine 'L_TOP' or exchange the sides") for text in texts] == [True] * told
+        forces.append(abs(step.contact["pad"].force[1]))
+    assert forces[0] == pytest.approx(11.6, rel=0.05)
+    assert forces[1] > 1.5 * forces[0]
+
+
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 
 

@@ -95,6 +95,25 @@ def test_thin_parts_bend_right_or_it_is_told(name, n, modes, told):
     assert (deflection < 0.7) if told else (0.97 < deflection < 1.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "n", "told"), [("tet4", 2, True), ("tet4", 4, False), ("wedge6", 2, True), ("hex8", 3, False)]
+)
+def test_a_coarse_mesh_is_told_with_a_figure_of_the_right_size(name, n, told):
+    """The force on a pad that is pressed between bonded plates, for which quadratic elements are nearly exact."""
+    forces = []
+    for element, k in ((name, n), ("tet10", 3)):
+        mesh = fc.generate.box((2.0, 2.0, 1.0), (2 * k, 2 * k, k), element)
+        model = made_of(mesh, "3d", fc.LinearElastic(E=1.0, nu=0.35), ZMIN="xyz", ZMAX="xy")
+        model.prescribe("ZMAX", z=-0.01)
+        step, texts = last_step(model, about="too stiff: the error")
+        figures = [float(re.search(r"displacements about (\d+)%", text)[1]) / 100 for text in texts]
+        forces.append((abs(step.reaction[mesh.points_of("ZMAX"), 2].sum()), figures))
+    (force, figures), (exact, none) = forces
+    assert not none
+    assert len(figures) == told
+    assert not told or 0.4 * (force / exact - 1.0) < figures[0] < force / exact - 1.0
+
+
 @pytest.mark.parametrize(("element", "told"), [("quad4", 1), ("quad8", 0)])
 def test_a_thin_part_that_bends_on_a_soft_body_is_told(element, told):
     strip, base = (

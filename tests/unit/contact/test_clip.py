@@ -58,14 +58,15 @@ def integrated(secondary, primary, kinds, reference=None, heights=None):
         np.zeros((2, 0, 0)) if heights is None else heights, (secondary, primary), strict=True
     )]  # fmt: skip
     factor = np.full((len(pairs), 2), 0.5)
-    wrong = _cut_faces_kernels.integrate(
+    folded = np.zeros(len(pairs), bool)
+    _cut_faces_kernels.integrate(
         0, len(corners), np.searchsorted(pairs[:, 0], np.arange(len(corners) + 1)),
         corners, one.n_corners, origin, axes, to_terms @ secondary, to_terms @ reference, to_terms,
         one.nodes[: one.n_corners].mean(axis=0), opposite, other.n_corners, other_to_terms @ primary,
         other_to_terms, other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), *above, factor,
-        of_pairs, coupling, closer,
+        of_pairs, coupling, closer, folded,
     )  # fmt: skip
-    assert wrong == -1
+    assert not folded.any()
     mass = np.zeros((len(secondary), *of_pairs.shape[1:]))
     np.add.at(mass, pairs[:, 0], of_pairs)
     return (pairs, mass, coupling) if heights is None else (pairs, mass, coupling, closer)
@@ -182,6 +183,18 @@ def test_facets_that_are_inclined_to_each_other_share_all():
     mesh = united(LOW_=flat, UP_=inclined.replace(points=points))
     found = face_overlap(surface(mesh, "LOW_ZMAX"), surface(mesh, "UP_ZMIN"), mesh.points, mesh.points, None)
     assert found.mass[0].sum() == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_curved_facet_ends_where_it_turns_away():
+    """A waisted cylinder, up to its equator: nothing lies above the flat facet beyond the waist."""
+    flat = fc.generate.box((4.0, 1.0, 1.0), (1, 1, 1), origin=(0.0, 0.0, -1.0))
+    rounded = fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), "hex20")
+    x, y, height = rounded.points.T
+    angle, radius = 0.5 + (0.5 * np.pi - 0.5) * x, 2.0 - 0.5 * height - 1.2 * y * (1.0 - y)
+    points = np.column_stack([radius * np.sin(angle), y, 2.0 - radius * np.cos(angle)])
+    mesh = united(LOW_=flat, UP_=rounded.replace(points=points))
+    found = face_overlap(surface(mesh, "LOW_ZMAX"), surface(mesh, "UP_ZMIN"), mesh.points, mesh.points, None)
+    assert found.mass[0].sum() == pytest.approx(2.0 * (1.0 - np.sin(0.5)) - 0.2, rel=0.1)
 
 
 def test_all_pairs_of_large_grids_are_found():
