@@ -106,7 +106,14 @@ def contact_result(
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
         shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
     forces, total, primary_points, primary_forces = _nodal_forces(pair, constraints, multiplier, tangential)
-    middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
+    fluid_pressure = fluid_forces = None
+    if pair.options.source is not None:
+        fluid_pressure, fluid_forces = np.zeros(len(points)), np.zeros_like(forces)
+    if constraints.wetted is not None:
+        fluid_pressure = constraints.wetted.pressure
+        fluid_forces = forces - _nodal_forces(pair, constraints, constraints.contact_forces(multiplier), tangential)[0]
+    contact_forces = forces if fluid_forces is None else forces - fluid_forces
+    middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", contact_forces, finite_normal), closed, gap)
     place, tangent = middle.distances(coordinates), middle.tangent
     distances = middle.distances(constraints.positions)
     along_tangent = distances if tangent is None else (constraints.positions - middle.position) @ tangent
@@ -115,7 +122,6 @@ def contact_result(
     if coordinates.shape[1] == 3:
         radius = _radius_in_facets(pair, place, closed, *radius)
         stick_bounds = _radius_in_facets(pair, place, sticking, *half_width(place, sticking))
-    dry = None if pair.options.source is None else np.zeros(len(points))
     abscissa, obstacle_results = pair.secondary.abscissa, dict[str, Any]()
     if axis is not None:  # distance from the axis
         offset = coordinates - axis[0]
@@ -149,7 +155,8 @@ def contact_result(
         direction=middle.direction if coordinates.shape[1] == 3 else None,
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
-        fluid_pressure=dry if constraints.wetted is None else constraints.wetted.pressure,
+        fluid_pressure=fluid_pressure,
+        fluid_force_vectors=fluid_forces,
         **obstacle_results,
     )
 
@@ -196,7 +203,8 @@ def _tangential_results(
     if not constraints.tangents:
         return np.zeros_like(normal), all_nodes, None
     tangential = solution.tangential
-    shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
+    normal_forces = constraints.normal_forces(constraints.contact_forces(multiplier))
+    shear = _nodal_shear(constraints, constraints.directions, tangential, normal, normal_forces)
     sticking, pressure = solution.sticking, constraints.pressure(multiplier)
     if len(sticking) != len(pressure):  # a node sticks if most of its pressure is due to sticking constraints
         sticking = constraints.nodal_field.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure

@@ -118,15 +118,21 @@ def warnings_of_run(warnings: Iterable[str], iterations: Mapping[str, Any]) -> l
 NEGLIGIBLE = 1e-3
 
 
-def force_text(force: Sequence[float], parts: Sequence[float], normal_force: float, units: Mapping[str, str]) -> str:
+def force_text(
+    force: Sequence[float], parts: Sequence[float], normal_force: float, units: Mapping[str, str], fluid: float = 0.0
+) -> str:
     """Return the magnitude of a contact force as text, with further values in parentheses.
 
     `parts` are `ContactResult.force_parts` [force]. With friction the further values are the normal and the tangential part.
     Without friction they are the components of the vector `force` (dim,) [force], unless it is parallel to an axis: in a half
     model, one of them is the component normal to the plane of symmetry, which the other half balances. If the nodal normal
     forces balance each other, their sum `normal_force` [force] is appended instead.
+    The magnitude of the force of a `fluid` [force], which `force` includes and the parts do not, is appended to the text.
     """
-    total, normal, tangential, normal_sum = (value_text(part, units, "force", 6) for part in (*parts, normal_force))
+    values = (*parts, normal_force, fluid)
+    total, normal, tangential, normal_sum, of_fluid = (value_text(value, units, "force", 6) for value in values)
+    if fluid:
+        return f"{force_text(force, parts, normal_force, units)}, of which the fluid {of_fluid}"
     if parts[0] < NEGLIGIBLE * normal_force:
         return f"{total}, sum of normal forces {normal_sum}"
     if parts[2] > LENGTH_ROUND_OFF * parts[0]:
@@ -190,13 +196,14 @@ class ContactResult(NameSuggestions):
         Nodal pressure as computed by the formulation, before the pressure of open nodes and of nodes in tension is
         redistributed to the closed nodes [pressure].
     force_vectors : ndarray (m, dim)
-        Contact force on each secondary node, in axisymmetry integrated over the full circle [force].
+        Contact force on each secondary node, in axisymmetry integrated over the full circle. It includes the force of a
+        fluid, `fluid_force_vectors` [force].
     normal : ndarray (m, dim)
         Unit outward normal of the opposite primary facet [-].
     active : ndarray of bool (m,)
         Whether the constraint of each node is closed.
     force : ndarray (dim,)
-        Resultant contact force on the secondary side [force].
+        Resultant contact force on the secondary side, including that of a fluid [force].
     radius : (float, float)
         Lower and upper bound of the contact radius, in 2D of the half-width along the `tangent` [length]; NaN without
         contact. They are the distances from the `middle` to the outermost closed node and to the first open node beyond it,
@@ -248,6 +255,8 @@ class ContactResult(NameSuggestions):
         Damage of the cohesive layer, from 0 (intact) to 1 (broken), with the option ``cohesion`` [-].
     fluid_pressure : ndarray (m,), optional
         Pressure of the fluid at the nodes that it has reached, with `Model.add_fluid_pressure` [pressure].
+    fluid_force_vectors : ndarray (m, dim), optional
+        Part of `force_vectors` due to the fluid; None without fluid, and in files of earlier versions [force].
     sliding_load : ndarray (m,), optional
         Integral of the pressure over the slip in this step, in pairs with friction [pressure * length].
     slip, slip_total : ndarray (m, dim)
@@ -308,6 +317,7 @@ class ContactResult(NameSuggestions):
     wear: Array | None = None
     damage: Array | None = None
     fluid_pressure: Array | None = None
+    fluid_force_vectors: Array | None = None
     sliding_load: Array | None = None
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
@@ -342,8 +352,9 @@ class ContactResult(NameSuggestions):
         radius = f"{low:.4g} to {outside}" if np.isfinite(high) else "none, closed to its end"
         if self.is_ring:
             radius = f"ring from {self.place[self.active].min():.4g} to {outside if np.isfinite(high) else inside}"
+        fluid = float(np.linalg.norm(self.fluid_force))
         return {
-            "force": force_text(self.force.tolist(), self.force_parts, self.normal_force, self.units),
+            "force": force_text(self.force.tolist(), self.force_parts, self.normal_force, self.units, fluid),
             "largest pressure": with_unit(f"{self.pressure_max:.6g}", self.units, "pressure"),
             "closed": f"{int(self.active.sum())} of {len(self.points)} nodes",
             "contact radius": radius if np.isfinite(low) else "none",
@@ -412,7 +423,7 @@ class ContactResult(NameSuggestions):
 
     @property
     def normal_force(self) -> float:
-        """Sum of the normal components of the nodal forces, positive in compression [force]."""
+        """Sum of the normal components of the nodal forces without those of a fluid, positive in compression [force]."""
         return float(self.normal_forces.sum())
 
     @property
@@ -421,18 +432,29 @@ class ContactResult(NameSuggestions):
 
     @property
     def normal_forces(self) -> Array:
-        """Normal components (m,) of the nodal forces, positive in compression; zero without an opposite point [force]."""
-        return np.einsum("nd,nd->n", self.force_vectors, self._finite_normal)
+        """Normal components (m,) of the nodal forces without those of a fluid; zero without an opposite point [force]."""
+        fluid = 0.0 if self.fluid_force_vectors is None else self.fluid_force_vectors
+        return np.einsum("nd,nd->n", self.force_vectors - fluid, self._finite_normal)
+
+    @property
+    def fluid_force(self) -> Array:
+        """Resultant force (dim,) of a fluid on the secondary side; zero without fluid [force]."""
+        if self.fluid_force_vectors is None:
+            return np.zeros_like(self.force)
+        total = self.fluid_force_vectors.sum(axis=0)
+        return np.where(self.force == 0.0, 0.0, total)  # see `force_parts`
 
     @property
     def force_parts(self) -> tuple[float, float, float]:
-        """Magnitudes of `force` and of the vector sums of the nodal normal and tangential forces [force].
+        """Magnitudes of `force` and of the vector sums of the nodal normal and tangential contact forces [force].
 
-        Without friction the last one is zero. Where normals vary, the second is smaller than `normal_force`.
+        The sums do not contain `fluid_force`. Without friction the last one is zero. Where normals vary, the second is
+        smaller than `normal_force`.
         """
-        along = self.normal_forces @ self._finite_normal if self.shear.any() else self.force
+        contact_force = self.force - self.fluid_force
+        along = self.normal_forces @ self._finite_normal if self.shear.any() else contact_force
         along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
-        total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)
+        total, normal_part, tangential = np.linalg.norm([self.force, along, contact_force - along], axis=1)
         return float(total), float(normal_part), float(tangential)
 
     def force_against_theory(self, share: float) -> float:

@@ -282,7 +282,7 @@ def test_fluid_pushes_a_ring_along_its_groove_until_the_wall_stops_it() -> None:
         model.add_fluid_pressure(name, 20.0 * pressure, source="BELOW", ramp=fluid)
     contact = fc.solve(model, [0.5, 1.0, 1.05])[-1].contact
     push = pressure * np.pi * (0.611**2 - 0.5**2)
-    rubs = 0.1 * sum(contact[name].normal_force for name in ("inner", "outer"))  # with the fluid, which does not rub
+    rubs = 0.1 * sum(contact[name].normal_force for name in ("inner", "outer"))
     assert push - rubs < contact["wall"].normal_force < push
 
 
