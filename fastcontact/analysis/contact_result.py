@@ -106,13 +106,11 @@ def contact_result(
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
         shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
     forces, total, primary_points, primary_forces = _nodal_forces(pair, constraints, multiplier, tangential)
-    fluid_pressure = fluid_forces = None
+    contact_forces, fluid = forces, dict[str, Any]()
     if pair.options.source is not None:
-        fluid_pressure, fluid_forces = np.zeros(len(points)), np.zeros_like(forces)
-    if constraints.wetted is not None:
-        fluid_pressure = constraints.wetted.pressure
-        fluid_forces = forces - _nodal_forces(pair, constraints, constraints.contact_forces(multiplier), tangential)[0]
-    contact_forces = forces if fluid_forces is None else forces - fluid_forces
+        contact_forces = _nodal_forces(pair, constraints, constraints.contact_forces(multiplier), tangential)[0]
+        fluid_pressure = np.zeros(len(points)) if constraints.wetted is None else constraints.wetted.pressure
+        fluid = {"fluid_pressure": fluid_pressure, "fluid_force_vectors": forces - contact_forces}
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", contact_forces, finite_normal), closed, gap)
     place, tangent = middle.distances(coordinates), middle.tangent
     distances = middle.distances(constraints.positions)
@@ -133,32 +131,12 @@ def contact_result(
             "torque": side.torque(coordinates + configuration.displacement[points], forces, configuration.pose),
         }
     return ContactResult(
-        name=name,
-        formulation=pair.name,
-        points=points,
-        coordinates=coordinates,
-        abscissa=abscissa,
-        gap=gap,
-        pressure=pressure,
-        multiplier=field,
-        force_vectors=forces,
-        normal=normal,
-        active=closed,
-        force=total,
-        radius=radius,
-        shear=shear,
-        sticking=sticking,
-        stick_bounds=stick_bounds,
-        middle=middle.position,
-        place=place,
-        tangent=tangent,
+        name=name, formulation=pair.name, points=points, coordinates=coordinates, abscissa=abscissa, gap=gap,
+        pressure=pressure, multiplier=field, force_vectors=forces, normal=normal, active=closed, force=total, radius=radius,
+        shear=shear, sticking=sticking, stick_bounds=stick_bounds, middle=middle.position, place=place, tangent=tangent,
         direction=middle.direction if coordinates.shape[1] == 3 else None,
-        primary_points=primary_points,
-        primary_force_vectors=primary_forces,
-        fluid_pressure=fluid_pressure,
-        fluid_force_vectors=fluid_forces,
-        **obstacle_results,
-    )
+        primary_points=primary_points, primary_force_vectors=primary_forces, **fluid, **obstacle_results,
+    )  # fmt: skip
 
 
 def _radius_in_facets(pair: Formulation, place: Array, zone: Mask, low: float, high: float) -> tuple[float, float]:

@@ -95,8 +95,8 @@ class ContactResultants:
         Centre of pressure of the normal forces, in finite strain on the deformed surface; NaN without contact [length]. In
         axisymmetry its radial component is NaN, since the resultant acts along the axis.
     normal_force : float
-        Sum of the nodal forces without those of a fluid, each along its own normal [force]. Multiplied by the coefficient of friction, it is
-        the friction capacity of a press fit, whose resultant force vanishes.
+        Sum of the nodal forces without those of a fluid, each along its own normal [force]. Multiplied by the coefficient
+        of friction, it is the friction capacity of a press fit, whose resultant force vanishes.
     mean_gap : float
         Mean gap over the area that faces the other side [length]; NaN if there is none.
     pressure_mean, pressure_max : float
@@ -203,17 +203,12 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
     if axisymmetric:
         centre[0] = np.nan
     return ContactResultants(
-        force=contact.force,
-        moment=np.zeros_like(moment) if axisymmetric else moment,
-        area=area,
-        centre=centre,
+        force=contact.force, moment=np.zeros_like(moment) if axisymmetric else moment, area=area, centre=centre,
         normal_force=total,
         mean_gap=float(areas[facing] @ contact.gap[facing] / areas[facing].sum()) if facing.any() else float("nan"),
-        pressure_mean=total / area if area else 0.0,
-        pressure_max=contact.pressure_max,
-        dissipation=contact.dissipation,
-        friction_work=work,
-    )
+        pressure_mean=total / area if area else 0.0, pressure_max=contact.pressure_max,
+        dissipation=contact.dissipation, friction_work=work,
+    )  # fmt: skip
 
 
 @typed(ContactError)

@@ -183,10 +183,14 @@ class ContactResult(NameSuggestions):
         [length]; this axis is the line along the normal through the node with the smallest gap in the reference
         configuration or, of several such nodes, the one nearest to the origin.
     gap : ndarray (m,)
-        Gap function, which includes the clearance: positive at open nodes, zero at closed nodes, and negative where a
-        penalty admits penetration. It is infinite at nodes without an opposite point, for example at the edge of a hole or
-        where the secondary side extends beyond the primary side, even if the facets around them carry pressure: use
-        ``gap[np.isfinite(gap)].max()`` instead of ``gap.max()`` [length].
+        Gap function, which includes the clearance: positive at open nodes, about zero at closed nodes, and negative where a
+        penalty admits penetration. Only `node_to_segment` contact closes the gaps of nodes exactly. The other formulations
+        close weighted means of the gap or the gaps at integration points. If facets on curved surfaces do not match, the
+        gap at a closed node differs from zero, or with a penalty from minus the ratio of pressure and penalty, by up to
+        about twice the sagitta of a facet, which is proportional to the square of the facet length. The gap is infinite at
+        nodes without an opposite point, for example at the edge of a hole or where the secondary side extends beyond the
+        primary side, even if the facets around them carry pressure: use ``gap[np.isfinite(gap)].max()`` instead of
+        ``gap.max()`` [length].
     pressure : ndarray (m,)
         Contact pressure per unit reference area, positive in compression; it is negative only in tied or bilateral contact
         under tension. Its interpolation by the shape functions of the facets integrates to the sum of the normal forces.
@@ -433,16 +437,16 @@ class ContactResult(NameSuggestions):
     @property
     def normal_forces(self) -> Array:
         """Normal components (m,) of the nodal forces without those of a fluid; zero without an opposite point [force]."""
-        fluid = 0.0 if self.fluid_force_vectors is None else self.fluid_force_vectors
-        return np.einsum("nd,nd->n", self.force_vectors - fluid, self._finite_normal)
+        return np.einsum("nd,nd->n", self.force_vectors - self._fluid_force_vectors, self._finite_normal)
+
+    @property
+    def _fluid_force_vectors(self) -> Array:
+        return 0.0 * self.force_vectors if self.fluid_force_vectors is None else self.fluid_force_vectors
 
     @property
     def fluid_force(self) -> Array:
         """Resultant force (dim,) of a fluid on the secondary side; zero without fluid [force]."""
-        if self.fluid_force_vectors is None:
-            return np.zeros_like(self.force)
-        total = self.fluid_force_vectors.sum(axis=0)
-        return np.where(self.force == 0.0, 0.0, total)  # see `force_parts`
+        return np.where(self.force == 0.0, 0.0, self._fluid_force_vectors.sum(axis=0))  # see `force_parts`
 
     @property
     def force_parts(self) -> tuple[float, float, float]:
@@ -595,7 +599,9 @@ class StepResult(NameSuggestions):
     @property
     def instant(self) -> str:
         """Text with the load factor, or with the frequency if the step is a vibration mode."""
-        return f"{self.iterations.get('parameter', 'load factor')} {self.load_factor:.6g}"
+        parameter = self.iterations.get("parameter", "load factor")
+        # The names of units do not include that of time, which follows from the unit of density.
+        return f"{parameter} {self.load_factor:.6g}{' per unit of time' if parameter == 'frequency' else ''}"
 
     @property
     def shown(self) -> dict[str, str]:

@@ -262,11 +262,8 @@ ELEMENTS = ("tri3", "tri6", "quad4", "quad8", "hex8", "tet4", "tet10", "wedge6",
 def bars(element, first=0, softer=None):
     """Return a model of two bars side by side, glued, pressed by the same strain; `first` is the material added first."""
     solid = element in ("hex8", "tet4", "tet10", "wedge6", "pyramid5")
-    mesh = (
-        fc.generate.box((2.0, 1.0, 1.0), (4, 2, 2), element)
-        if solid
-        else fc.generate.block((2.0, 1.0), (4, 2), element)
-    )
+    sizes = ((2.0, 1.0, 1.0), (4, 2, 2)) if solid else ((2.0, 1.0), (4, 2))
+    mesh = (fc.generate.box if solid else fc.generate.block)(*sizes, element)
     groups = {}
     for number, side in enumerate((lambda x: x < 1, lambda x: x > 1)):
         cells = [
