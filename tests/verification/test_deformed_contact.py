@@ -277,10 +277,8 @@ def test_fluid_pushes_a_ring_along_its_groove_until_the_wall_stops_it() -> None:
     for name in ("inner", "outer"):
         model.add_fluid_pressure(name, 20.0 * pressure, source="BELOW", ramp=fluid)
     contact = fc.solve(model, [0.5, 1.0, 1.05])[-1].contact
-    push, rubs = (
-        pressure * np.pi * (0.611**2 - 0.5**2),
-        0.1 * sum(contact[name].normal_force for name in ("inner", "outer")),
-    )
+    rubs = 0.1 * sum(contact[name].normal_force for name in ("inner", "outer"))
+    push = pressure * np.pi * (0.611**2 - 0.5**2)
     assert contact["wall"].normal_force == pytest.approx(push - rubs, rel=5e-3)
     assert contact["inner"].force_parts[2] == pytest.approx(0.1 * contact["inner"].normal_force)
     problem = prepare(model, fc.linear_ramp(1), fc.Criteria())

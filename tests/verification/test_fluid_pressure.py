@@ -74,10 +74,8 @@ def test_the_front_stops_where_the_contact_presses_more():
         assert (contact.pressure[order][~wet] > fluid).all()
         assert (contact.gap[order][wet] > 0.0).all()
         assert (contact.active[order] == ~wet).all()
-        x, pressure = (
-            contact.coordinates[order, 0],
-            contact.pressure[order],
-        )  # of which resultants are, except for the force
+        # Resultants except for the force are those of the contact pressure.
+        x, pressure = contact.coordinates[order, 0], contact.pressure[order]
         assert resultants.normal_force == pytest.approx(np.trapezoid(pressure, x), rel=1e-3)
         assert resultants.pressure_mean < pressure.max()
         assert resultants.centre[0] == pytest.approx(np.trapezoid(pressure * x, x) / resultants.normal_force, rel=0.02)
