@@ -106,7 +106,12 @@ def contact_result(
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
         shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
     forces, total, primary_points, primary_forces = _nodal_forces(pair, constraints, multiplier, tangential)
-    middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
+    contact_forces, fluid = forces, dict[str, Any]()
+    if pair.options.source is not None:
+        contact_forces = _nodal_forces(pair, constraints, constraints.contact_forces(multiplier), tangential)[0]
+        fluid_pressure = np.zeros(len(points)) if constraints.wetted is None else constraints.wetted.pressure
+        fluid = {"fluid_pressure": fluid_pressure, "fluid_force_vectors": forces - contact_forces}
+    middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", contact_forces, finite_normal), closed, gap)
     place, tangent = middle.distances(coordinates), middle.tangent
     distances = middle.distances(constraints.positions)
     along_tangent = distances if tangent is None else (constraints.positions - middle.position) @ tangent
@@ -115,7 +120,6 @@ def contact_result(
     if coordinates.shape[1] == 3:
         radius = _radius_in_facets(pair, place, closed, *radius)
         stick_bounds = _radius_in_facets(pair, place, sticking, *half_width(place, sticking))
-    dry = None if pair.options.source is None else np.zeros(len(points))
     abscissa, obstacle_results = pair.secondary.abscissa, dict[str, Any]()
     if axis is not None:  # distance from the axis
         offset = coordinates - axis[0]
@@ -127,31 +131,12 @@ def contact_result(
             "torque": side.torque(coordinates + configuration.displacement[points], forces, configuration.pose),
         }
     return ContactResult(
-        name=name,
-        formulation=pair.name,
-        points=points,
-        coordinates=coordinates,
-        abscissa=abscissa,
-        gap=gap,
-        pressure=pressure,
-        multiplier=field,
-        force_vectors=forces,
-        normal=normal,
-        active=closed,
-        force=total,
-        radius=radius,
-        shear=shear,
-        sticking=sticking,
-        stick_bounds=stick_bounds,
-        middle=middle.position,
-        place=place,
-        tangent=tangent,
+        name=name, formulation=pair.name, points=points, coordinates=coordinates, abscissa=abscissa, gap=gap,
+        pressure=pressure, multiplier=field, force_vectors=forces, normal=normal, active=closed, force=total, radius=radius,
+        shear=shear, sticking=sticking, stick_bounds=stick_bounds, middle=middle.position, place=place, tangent=tangent,
         direction=middle.direction if coordinates.shape[1] == 3 else None,
-        primary_points=primary_points,
-        primary_force_vectors=primary_forces,
-        fluid_pressure=dry if constraints.wetted is None else constraints.wetted.pressure,
-        **obstacle_results,
-    )
+        primary_points=primary_points, primary_force_vectors=primary_forces, **fluid, **obstacle_results,
+    )  # fmt: skip
 
 
 def _radius_in_facets(pair: Formulation, place: Array, zone: Mask, low: float, high: float) -> tuple[float, float]:
@@ -196,7 +181,8 @@ def _tangential_results(
     if not constraints.tangents:
         return np.zeros_like(normal), all_nodes, None
     tangential = solution.tangential
-    shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
+    normal_forces = constraints.normal_forces(constraints.contact_forces(multiplier))
+    shear = _nodal_shear(constraints, constraints.directions, tangential, normal, normal_forces)
     sticking, pressure = solution.sticking, constraints.pressure(multiplier)
     if len(sticking) != len(pressure):  # a node sticks if most of its pressure is due to sticking constraints
         sticking = constraints.nodal_field.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure

@@ -168,6 +168,22 @@ def friction_note(problem: Problem, state: State) -> str:
     )
 
 
+def fluid_note(problem: Problem, end: float) -> str:
+    """Return the end of the message of a load step that fails at the instant `end` if a fluid acts on nonlinear bodies.
+
+    The front of a fluid advances by complete facets. Where a body without friction gives way to the jump of the force, there
+    may be no equilibrium, neither with the node at the front wet nor with it dry. The tangent of such a body is not positive
+    definite, so that regularised iterations converge slowly, and alternate with each change of the node.
+    """
+    names = [name for name, pressure in problem.load_at(end).fluids.items() if pressure > 0.0]
+    if not names or problem.bodies is None:
+        return ""
+    return (
+        f"; if smaller steps do not help, the cause may be the fluid in contact {', '.join(map(repr, names))}, whose force "
+        "jumps where its front advances by a facet: use shorter facets at the front, or friction"
+    )
+
+
 def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indices) -> Nodes:
     """Return by contact pair the secondary nodes nearest to constraints, given by their row numbers over all pairs."""
     nodes: Nodes = {}

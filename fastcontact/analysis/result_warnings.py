@@ -51,6 +51,9 @@ SLIDE_PAST_ENDS, SLIDE_PAST_ENDS_DUAL = 0.01, 0.3
 # Alternation of shear above which a warning is given. It is 0.42 to 1.0 in continuous contact with quadratic facets where a
 # contact that sticks grows, and at most 0.1 with mortar.
 SHEAR_ALTERNATING = 0.4
+# Length of facets at the edge of an adhesive contact, relative to the range of adhesion, above which a warning is given. The
+# pull-off force of a ball (JKR theory) changes by up to 1 % with a ratio of 2.5, 4 % with 4.9, and 10 % with 9.8.
+LONGEST_ADHESIVE_FACET = 4.0
 # Smallest number of nodes for which the median is meaningful.
 MIN_NODES = 10
 # Number of the first step in which nothing determines the position of some bodies, the free motions of each of them by its
@@ -105,7 +108,7 @@ def result_warnings(
             texts += [] if at_edge else _pressure_peak_at_edge(pair, last, peak, displacement)
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += pressures or _shear_oscillation(pair, contact)
-        warnings += [*at_edge, *_sliding_past_ends(pair, contact)]
+        warnings += [*at_edge, *_sliding_past_ends(pair, contact), *_coarse_adhesion(pair, contacts[name])]
         warnings += _excessive_wear(name, pair, state, not pressures)
     warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_energy_imbalance(state)]
     return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]
@@ -397,7 +400,9 @@ def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> 
             # a rigid plane, forces are 0.5 % too large with mortar and 6 % too small with continuous contact.
             if pair.weighs_gaps and pair.secondary.order == 2:
                 remedy += ", or, unless it is a sharp corner, use formulation 'continuous', which is then more accurate"
-            remedy += ". At a sharp corner, refinement does not widen the contact; compare forces there"
+            remedy += (
+                ". At a sharp corner, refinement does not widen the contact; compare forces (errors up to 6 %) there"
+            )
             depth = -float(contact.gap[contact.active].min())
             if pair.name == "continuous" and depth > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max()):
                 remedy += (
@@ -423,6 +428,22 @@ def _too_few_elements(pair: Formulation, contact: ContactResult, state: State) -
     closed = _closed_or_enclosed(contact.active, pair.secondary)
     count = facets_across_radius(pair.secondary, closed, pair.excluded[pair.secondary.points])
     return count if count is not None and count < MIN_ELEMENTS_ACROSS_RADIUS else 0
+
+
+def _coarse_adhesion(pair: Formulation, contact: ContactResult) -> Iterator[str]:
+    """Yield a warning if facets at the edge of an adhesive contact are much longer than the range of adhesion."""
+    law = pair.options.cohesion
+    if law is None or not law.reversible:
+        return
+    closed = [contact.active[block.local].mean(axis=1) for block in pair.secondary.blocks]
+    at_edge = np.concatenate([(fraction > 0.0) & (fraction < 1.0) for fraction in closed])
+    lengths = np.concatenate([block.diameters(pair.points) for block in pair.secondary.blocks])[at_edge]
+    reach = 2.0 * law.energy / law.strength
+    if len(lengths) and (ratio := float(np.median(lengths)) / reach) > LONGEST_ADHESIVE_FACET:
+        yield (
+            f"facets at the edge of contact '{contact.name}' are {ratio:.3g} times as long as the range of adhesion, "
+            f"{reach:.3g}: forces may be wrong by 5 % with a ratio of 5 and 10 % with 10; refine '{pair.secondary.group}'"
+        )
 
 
 def facets_across_radius(side: Surface, closed: Mask, excluded: Mask) -> int | None:

@@ -82,10 +82,10 @@ class ContactResultants:
     Attributes
     ----------
     force : ndarray (dim,)
-        Resultant force on the secondary side [force].
+        Resultant force on the secondary side, including that of a fluid [force].
     moment : ndarray (1,) or (3,)
-        Moment of the contact forces about the middle of the contact, see `contact_moment`; zero in axisymmetry
-        [force times length].
+        Moment of the contact forces about the middle of the contact, including those of a fluid, see `contact_moment`;
+        zero in axisymmetry [force times length].
     area : float
         Contact area: sum of the tributary areas of the closed nodes, in finite strain on the deformed facets; in 2D
         a length times unit thickness, in axisymmetry over the full circle [length^2]. Its error is up to one row of facets
@@ -95,12 +95,12 @@ class ContactResultants:
         Centre of pressure of the normal forces, in finite strain on the deformed surface; NaN without contact [length]. In
         axisymmetry its radial component is NaN, since the resultant acts along the axis.
     normal_force : float
-        Sum of the nodal forces, each along its own normal [force]. Multiplied by the coefficient of friction, it is
-        the friction capacity of a press fit, whose resultant force vanishes.
+        Sum of the nodal forces without those of a fluid, each along its own normal [force]. Multiplied by the coefficient
+        of friction, it is the friction capacity of a press fit, whose resultant force vanishes.
     mean_gap : float
         Mean gap over the area that faces the other side [length]; NaN if there is none.
     pressure_mean, pressure_max : float
-        Normal force divided by area, and the largest nodal pressure [pressure].
+        Normal force divided by area, and the largest nodal pressure, both without the pressure of a fluid [pressure].
     dissipation, friction_work : float
         Work of friction in this step, and accumulated over all steps [energy].
     worn_volume : float
@@ -209,17 +209,12 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
     if axisymmetric:
         centre[0] = np.nan
     return ContactResultants(
-        force=contact.force,
-        moment=np.zeros_like(moment) if axisymmetric else moment,
-        area=area,
-        centre=centre,
+        force=contact.force, moment=np.zeros_like(moment) if axisymmetric else moment, area=area, centre=centre,
         normal_force=total,
         mean_gap=float(areas[facing] @ contact.gap[facing] / areas[facing].sum()) if facing.any() else float("nan"),
-        pressure_mean=total / area if area else 0.0,
-        pressure_max=contact.pressure_max,
-        dissipation=contact.dissipation,
-        friction_work=work,
-    )
+        pressure_mean=total / area if area else 0.0, pressure_max=contact.pressure_max,
+        dissipation=contact.dissipation, friction_work=work,
+    )  # fmt: skip
 
 
 @typed(ContactError)

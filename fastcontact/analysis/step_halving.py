@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastcontact.analysis.convergence_messages import friction_note, limit_load_note
+from fastcontact.analysis.convergence_messages import fluid_note, friction_note, limit_load_note
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.load_step import load_step, prepare_start
 from fastcontact.analysis.newton import newton
@@ -97,7 +97,7 @@ def _substeps(
                 else:  # only a step that has not been halved may converge in smaller ones
                     more = "; more load steps may help" if error.smaller_steps_help else ""
                     location = f"step {index} {where}{more}"
-                cause = limit_load_note(problem, state) or friction_note(problem, state)
+                cause = limit_load_note(problem, state) or friction_note(problem, state) or fluid_note(problem, end)
                 final = ConvergenceError(f"{error} ({location}{cause})", error.history, smaller_steps_help=False)
                 # Keep the traceback of the original error, but do not chain it: its message is part of the new one.
                 raise final.with_traceback(error.__traceback__) from None

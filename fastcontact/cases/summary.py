@@ -125,6 +125,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "closed_nodes": int(contact.active.sum()),
         "obstacle_displacement": None if displacement is None else displacement.tolist(),
         **({} if contact.torque is None else {"obstacle_angle": contact.obstacle_angle, "torque": contact.torque}),
+        **({"fluid_force": float(np.linalg.norm(contact.fluid_force))} if contact.fluid_force.any() else {}),
         **({} if contact.wear is None else {"wear_max": float(contact.wear.max(initial=0.0))}),
         "penalty": penalty,
     }
@@ -260,7 +261,8 @@ def count(number: int, noun: str) -> str:
 def _contact_lines(name: str, contact: Mapping[str, Any], units: Mapping[str, str]) -> Iterator[str]:
     """Yield the lines of a contact pair or a rigid obstacle."""
     lower, upper = contact["radius"]
-    force = force_text(contact["force_vector"], contact["force_parts"], contact["normal_force"], units)
+    forces = (contact["force_vector"], contact["force_parts"], contact["normal_force"])
+    force = force_text(*forces, units, contact.get("fluid_force", 0.0))
     yield (
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
         f"{value_text(contact['pressure_max'], units, 'pressure', 6)}, {_extent_text(contact['extent'], lower, upper, units)}"

@@ -100,7 +100,7 @@ SPARSE_FIELDS = ("reaction", "heat_reaction", *CONTACT_FIELDS)
 OPTIONAL_FIELDS = ("temperature", "heat_reaction", "contact_wear", "contact_damage", "contact_fluid_pressure")
 # Optional columns of contact tables, and optional vectors of contact pairs.
 OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure", "sliding_load")
-OPTIONAL_VECTORS = ("displacement",)
+OPTIONAL_VECTORS = ("displacement", "fluid_force_vectors")
 
 # Number of components of the cell data of models with material interfaces: the nodal stress of the material of a cell,
 # averaged over the nodes of the cell, and its von Mises stress.

@@ -119,16 +119,22 @@ def warnings_of_run(warnings: Iterable[str], iterations: Mapping[str, Any]) -> l
 NEGLIGIBLE, INCLINED = 1e-3, 0.95
 
 
-def force_text(force: Sequence[float], parts: Sequence[float], normal_force: float, units: Mapping[str, str]) -> str:
+def force_text(
+    force: Sequence[float], parts: Sequence[float], normal_force: float, units: Mapping[str, str], fluid: float = 0.0
+) -> str:
     """Return the magnitude of a contact force as text, with further values in parentheses.
 
     `parts` are `ContactResult.force_parts` [force]. With friction the further values are the normal and the tangential part.
     Without friction they are the components of the vector `force` (dim,) [force], unless it is parallel to an axis: in a half
     model, one of them is the component normal to the plane of symmetry, which the other half balances. If the nodal normal
     forces partly balance each other, their sum `normal_force` [force] is appended, and if they balance completely it is the
-    only one of these values.
+    only one of these values. The magnitude of the force of a `fluid` [force], which `force` includes and the parts do not, is
+    appended, too.
     """
-    total, normal, tangential, normal_sum = (value_text(part, units, "force", 6) for part in (*parts, normal_force))
+    values = (*parts, normal_force, fluid)
+    total, normal, tangential, normal_sum, of_fluid = (value_text(value, units, "force", 6) for value in values)
+    if fluid:
+        return f"{force_text(force, parts, normal_force, units)}, of which the fluid {of_fluid}"
     suffix = f", sum of normal forces {normal_sum}" if min(parts[:2]) < INCLINED * normal_force else ""
     if parts[0] < NEGLIGIBLE * normal_force:
         return total + suffix
@@ -180,10 +186,14 @@ class ContactResult(NameSuggestions):
         [length]; this axis is the line along the normal through the node with the smallest gap in the reference
         configuration or, of several such nodes, the one nearest to the origin.
     gap : ndarray (m,)
-        Gap function, which includes the clearance: positive at open nodes, zero at closed nodes, and negative where a
-        penalty admits penetration. It is infinite at nodes without an opposite point, for example at the edge of a hole or
-        where the secondary side extends beyond the primary side, even if the facets around them carry pressure: use
-        ``gap[np.isfinite(gap)].max()`` instead of ``gap.max()`` [length].
+        Gap function, which includes the clearance: positive at open nodes, about zero at closed nodes, and negative where a
+        penalty admits penetration. Only `node_to_segment` contact closes the gaps of nodes exactly. The other formulations
+        close weighted means of the gap or the gaps at integration points. If facets on curved surfaces do not match, the
+        gap at a closed node differs from zero, or with a penalty from minus the ratio of pressure and penalty, by up to
+        about twice the sagitta of a facet, which is proportional to the square of the facet length. The gap is infinite at
+        nodes without an opposite point, for example at the edge of a hole or where the secondary side extends beyond the
+        primary side, even if the facets around them carry pressure: use ``gap[np.isfinite(gap)].max()`` instead of
+        ``gap.max()`` [length].
     pressure : ndarray (m,)
         Contact pressure per unit reference area, positive in compression; it is negative only in tied or bilateral contact
         under tension. Its interpolation by the shape functions of the facets integrates to the sum of the normal forces.
@@ -193,13 +203,14 @@ class ContactResult(NameSuggestions):
         Nodal pressure as computed by the formulation, before the pressure of open nodes and of nodes in tension is
         redistributed to the closed nodes [pressure].
     force_vectors : ndarray (m, dim)
-        Contact force on each secondary node, in axisymmetry integrated over the full circle [force].
+        Contact force on each secondary node, in axisymmetry integrated over the full circle. It includes the force of a
+        fluid, `fluid_force_vectors` [force].
     normal : ndarray (m, dim)
         Unit outward normal of the opposite primary facet [-].
     active : ndarray of bool (m,)
         Whether the constraint of each node is closed.
     force : ndarray (dim,)
-        Resultant contact force on the secondary side [force].
+        Resultant contact force on the secondary side, including that of a fluid [force].
     radius : (float, float)
         Lower and upper bound of the contact radius, in 2D of the half-width along the `tangent` [length]; NaN without
         contact. They are the distances from the `middle` to the outermost closed node and to the first open node beyond it,
@@ -251,6 +262,8 @@ class ContactResult(NameSuggestions):
         Damage of the cohesive layer, from 0 (intact) to 1 (broken), with the option ``cohesion`` [-].
     fluid_pressure : ndarray (m,), optional
         Pressure of the fluid at the nodes that it has reached, with `Model.add_fluid_pressure` [pressure].
+    fluid_force_vectors : ndarray (m, dim), optional
+        Part of `force_vectors` due to the fluid; None without fluid, and in files of earlier versions [force].
     sliding_load : ndarray (m,), optional
         Integral of the pressure over the slip in this step, in pairs with friction [pressure * length].
     slip, slip_total : ndarray (m, dim)
@@ -311,6 +324,7 @@ class ContactResult(NameSuggestions):
     wear: Array | None = None
     damage: Array | None = None
     fluid_pressure: Array | None = None
+    fluid_force_vectors: Array | None = None
     sliding_load: Array | None = None
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
@@ -345,8 +359,9 @@ class ContactResult(NameSuggestions):
         radius = f"{low:.4g} to {outside}" if np.isfinite(high) else "none, closed to its end"
         if self.is_ring:
             radius = f"ring from {self.place[self.active].min():.4g} to {outside if np.isfinite(high) else inside}"
+        fluid = float(np.linalg.norm(self.fluid_force))
         return {
-            "force": force_text(self.force.tolist(), self.force_parts, self.normal_force, self.units),
+            "force": force_text(self.force.tolist(), self.force_parts, self.normal_force, self.units, fluid),
             "largest pressure": with_unit(f"{self.pressure_max:.6g}", self.units, "pressure"),
             "closed": f"{int(self.active.sum())} of {len(self.points)} nodes",
             "contact radius": radius if np.isfinite(low) else "none",
@@ -415,7 +430,7 @@ class ContactResult(NameSuggestions):
 
     @property
     def normal_force(self) -> float:
-        """Sum of the normal components of the nodal forces, positive in compression [force]."""
+        """Sum of the normal components of the nodal forces without those of a fluid, positive in compression [force]."""
         return float(self.normal_forces.sum())
 
     @property
@@ -424,18 +439,29 @@ class ContactResult(NameSuggestions):
 
     @property
     def normal_forces(self) -> Array:
-        """Normal components (m,) of the nodal forces, positive in compression; zero without an opposite point [force]."""
-        return np.einsum("nd,nd->n", self.force_vectors, self._finite_normal)
+        """Normal components (m,) of the nodal forces without those of a fluid; zero without an opposite point [force]."""
+        return np.einsum("nd,nd->n", self.force_vectors - self._fluid_force_vectors, self._finite_normal)
+
+    @property
+    def _fluid_force_vectors(self) -> Array:
+        return 0.0 * self.force_vectors if self.fluid_force_vectors is None else self.fluid_force_vectors
+
+    @property
+    def fluid_force(self) -> Array:
+        """Resultant force (dim,) of a fluid on the secondary side; zero without fluid [force]."""
+        return np.where(self.force == 0.0, 0.0, self._fluid_force_vectors.sum(axis=0))  # see `force_parts`
 
     @property
     def force_parts(self) -> tuple[float, float, float]:
-        """Magnitudes of `force` and of the vector sums of the nodal normal and tangential forces [force].
+        """Magnitudes of `force` and of the vector sums of the nodal normal and tangential contact forces [force].
 
-        Without friction the last one is zero. Where normals vary, the second is smaller than `normal_force`.
+        The sums do not contain `fluid_force`. Without friction the last one is zero. Where normals vary, the second is
+        smaller than `normal_force`.
         """
-        along = self.normal_forces @ self._finite_normal if self.shear.any() else self.force
+        contact_force = self.force - self.fluid_force
+        along = self.normal_forces @ self._finite_normal if self.shear.any() else contact_force
         along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
-        total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)
+        total, normal_part, tangential = np.linalg.norm([self.force, along, contact_force - along], axis=1)
         return float(total), float(normal_part), float(tangential)
 
     def force_against_theory(self, share: float) -> float:
@@ -576,7 +602,9 @@ class StepResult(NameSuggestions):
     @property
     def instant(self) -> str:
         """Text with the load factor, or with the frequency if the step is a vibration mode."""
-        return f"{self.iterations.get('parameter', 'load factor')} {self.load_factor:.6g}"
+        parameter = self.iterations.get("parameter", "load factor")
+        # The names of units do not include that of time, which follows from the unit of density.
+        return f"{parameter} {self.load_factor:.6g}{' per unit of time' if parameter == 'frequency' else ''}"
 
     @property
     def shown(self) -> dict[str, str]:

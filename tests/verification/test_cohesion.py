@@ -10,12 +10,8 @@ import fastcontact as fc
 
 pytestmark = pytest.mark.each_value
 
-FORMULATIONS = (
-    {},
-    {"formulation": "mortar", "multipliers": "standard"},
-    {"formulation": "continuous"},
-    {"formulation": "node_to_segment"},
-)
+STANDARD = {"formulation": "mortar", "multipliers": "standard"}
+FORMULATIONS = ({}, STANDARD, {"formulation": "continuous"}, {"formulation": "node_to_segment"})
 STRENGTH, ENERGY, STIFFNESS, E = 10.0, 0.5, 1000.0, 1000.0
 ONSET, END = STRENGTH / STIFFNESS, 2.0 * ENERGY / STRENGTH
 
@@ -192,6 +188,10 @@ def test_adhesion_on_facets_longer_than_its_reach_tells_it():
     criteria = fc.Criteria(max_geometry_updates=1)
     with pytest.raises(fc.ConvergenceError, match=r"facets no longer than the range of adhesion, 0\.0007, .* 'ball'"):
         fc.solve(model, 1, criteria=criteria)
+    model.contact.clear()
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -1e-3}, adhesion={**law, "work": 1e-3})
+    with pytest.warns(fc.FastcontactWarning, match="'ball' are 6.25 times as long as the range of adhesion, 0.02"):
+        fc.solve(model, 1)
 
 
 def test_what_is_refused():
@@ -214,16 +214,11 @@ def test_what_is_refused():
 
 def sheared_strips(layer, pressed=0.0, element="quad4", swap=False, angle=0.0, divisions=12, solver="direct"):
     """Two strips of 60 by 3 (by 4) with a layer between them, drawn along it; all nodes are held along its normal."""
+    places = ((12, 0), (divisions, -3))
     if element == "hex8":
-        strips = [
-            fc.generate.box((60.0, 4.0, 3.0), (n, 1, 1), element, (0.0, 0.0, z), name="BODY")
-            for n, z in ((12, 0), (divisions, -3))
-        ]
+        strips = [fc.generate.box((60.0, 4.0, 3.0), (n, 1, 1), element, (0.0, 0.0, z), name="BODY") for n, z in places]
     else:
-        strips = [
-            fc.generate.block((60.0, 3.0), (n, 1), element, (0.0, y), name="BODY")
-            for n, y in ((12, 0), (divisions, -3))
-        ]
+        strips = [fc.generate.block((60.0, 3.0), (n, 1), element, (0.0, y), name="BODY") for n, y in places]
     mesh = united(UP_=strips[0], LO_=strips[1])
     left, right, bottom, top = ("LEFT", "RIGHT", "BOTTOM", "TOP") if mesh.dim == 2 else ("XMIN", "XMAX", "ZMIN", "ZMAX")
     axes, across = np.eye(3), "xyz"[mesh.dim - 1]

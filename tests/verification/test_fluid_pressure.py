@@ -62,9 +62,10 @@ def test_a_flat_seal_opens_at_the_pressure_of_statics(options, element):
 
 def test_the_front_stops_where_the_contact_presses_more():
     """A push that grows from left to right, on a soft foundation of strips: fluid comes as far as it is stronger."""
-    step = fc.solve(seal(push=lambda x: -0.004 - 0.01 * x[:, 0]), fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30))))
+    model = seal(push=lambda x: -0.004 - 0.01 * x[:, 0])
+    step = fc.solve(model, fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30))))
     dry, reaches = step[0].contact["seal"], []
-    for later, fluid in zip(step[1:], (3.0, 6.0)):
+    for later, fluid, resultants in zip(step[1:], (3.0, 6.0), fc.contact_resultants(model, step, "seal")[1:]):
         contact = later.contact["seal"]
         order = np.argsort(contact.coordinates[:, 0])
         wet = contact.fluid_pressure[order] > 0.0
@@ -73,6 +74,13 @@ def test_the_front_stops_where_the_contact_presses_more():
         assert (contact.pressure[order][~wet] > fluid).all()
         assert (contact.gap[order][wet] > 0.0).all()
         assert (contact.active[order] == ~wet).all()
+        # Resultants except for the force are those of the contact pressure.
+        x, pressure = contact.coordinates[order, 0], contact.pressure[order]
+        assert resultants.normal_force == pytest.approx(np.trapezoid(pressure, x), rel=1e-3)
+        assert resultants.pressure_mean < pressure.max()
+        assert resultants.centre[0] == pytest.approx(np.trapezoid(pressure * x, x) / resultants.normal_force, rel=0.02)
+        assert contact.fluid_force == pytest.approx([0.0, contact.force[1] - contact.normal_force], rel=1e-3)
+        assert f"of which the fluid {contact.fluid_force[1]:.6g}" in repr(contact)
     assert dry.active.all()
     assert 0 < reaches[0] < reaches[1] < len(dry.points)
 
@@ -192,6 +200,7 @@ def test_fluid_presses_on_the_part_of_the_secondary_side_that_faces_nothing(opti
     model.add_fluid_pressure("seal", 2.0, source=f"W {top}")
     seal = fc.solve(model, 1)[-1].contact["seal"]
     assert (seal.fluid_pressure == 2.0).all()
+    assert seal.normal_force == 0.0
     assert seal.force == pytest.approx([0.0] * (len(axes) - 1) + [-4.0], abs=1e-6)
     assert seal.primary_force_vectors.sum(axis=0)[-1] == pytest.approx(0.8, rel=1e-6)
 

@@ -29,7 +29,7 @@ from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult, Steps
 
 # Attributes of `ContactResult` that are proportional to the thickness of a plane model.
-EXTENSIVE_FIELDS = ("force", "force_vectors", "dissipation", "primary_force_vectors")
+EXTENSIVE_FIELDS = ("force", "force_vectors", "fluid_force_vectors", "dissipation", "primary_force_vectors")
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,8 @@ from fastcontact.results.units import axis_label, value_text
 MARGIN = 0.15
 # Smallest height of a figure relative to that of a square map. The colour bar of a flatter map lies below the map.
 FLAT = 0.55
+# Ratio of the length to the width of a map beyond which its axes have different scales.
+LONG = 5.0
 # Smallest magnitude of the mean of the unit normals of a surface for which it can be projected along the mean normal.
 LEAST_MEAN = 0.3
 # Captions of the fields that can be plotted next to the pressure, and the quantities that determine their units.
@@ -110,8 +112,11 @@ def contact_map(
         ax.figure.colorbar(artist, ax=ax, label=axis_label(caption, units, quantity), **bar)
         _mark_nodes(ax, flat, contact, distinguish=two_maps and bool(contact.shear.any()))
         x_label, y_label = (axis_label(label, units, "length") for label in labels)
-        ax.set(xlabel=x_label, ylabel=y_label, aspect="equal")
-        ax.set_title(f"{caption}\nlargest {value_text(values.max(initial=0.0), units, quantity)}", fontsize="medium")
+        ax.set(xlabel=x_label, ylabel=y_label)
+        note = "" if ax.get_aspect() == 1.0 else "\nscales of the axes differ"
+        ax.set_title(
+            f"{caption}\nlargest {value_text(values.max(initial=0.0), units, quantity)}{note}", fontsize="medium"
+        )
     if two_maps and second_values.ndim == 2:
         large = size > 0.1 * size.max()  # the direction of small vectors is not shown
         panels[1].quiver(*flat[large].T, *(second_values @ basis.T)[large].T, color="white", width=0.004, pivot="tail")
@@ -119,7 +124,8 @@ def contact_map(
         panels[0].figure.set_figheight(1.6 + 3.0 * relative_height)
     panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")
     if contact.active.any():
-        panels[0].legend(loc="upper right", fontsize=8)
+        parent, place = (panels[0], "upper right") if axes is not None else (panels[0].figure, "outside lower right")
+        parent.legend(*panels[0].get_legend_handles_labels(), loc=place, fontsize=8)
     return Panels(panels)
 
 
@@ -187,6 +193,8 @@ def _loaded_nodes(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
 def _set_limits(ax: Any, flat: Array, closed: Mask) -> float:
     """Set the limits of the axes to the closed part with a margin, or to the entire surface if no node is closed.
 
+    The scales of the axes are equal unless the map would be too narrow.
+
     Returns the height of the figure relative to that of a square map, from FLAT to 1 [-].
     """
     points = flat[closed] if closed.any() else flat
@@ -197,4 +205,7 @@ def _set_limits(ax: Any, flat: Array, closed: Mask) -> float:
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.set_facecolor("0.9")
     width, height = high - low
+    if max(width, height) > LONG * min(width, height):
+        return 1.0
+    ax.set_aspect("equal")
     return float(np.clip(1.1 * height / max(width, 1e-300), FLAT, 1.0))

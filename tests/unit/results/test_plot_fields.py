@@ -279,9 +279,7 @@ def test_a_contact_map_shows_the_pressure_at_the_nodes(element, turned):
     assert len(closed.get_xdata()) == contact.active.sum()
     reach = np.abs(contact.coordinates[contact.active][:, 0]).max()
     assert reach < ax.get_xlim()[1] < 1.0
-    ends = across[
-        contact.pressure == 0.0, 0
-    ]  # next to the last closed nodes: pressure falls to zero within the picture
+    ends = across[contact.pressure == 0.0, 0]  # pressure falls to zero within the picture
     assert ends[ends > reach + 1e-9].min() < ax.get_xlim()[1]
     assert axes._repr_png_().startswith(b"\x89PNG")
 
@@ -420,12 +418,8 @@ def result(tmp_path_factory):
     return folder / "ball.vtkhdf"
 
 
-DRAWINGS = [
-    ["--map"],
-    ["--section", "z=0", "--field", "stress.yy", "--zoom", "8"],
-    ["--field", "displacement.y", "--scale", "10"],
-    ["--history"],
-]
+SECTION = "--section z=0 --field stress.yy --zoom 8"
+DRAWINGS = [text.split() for text in ("--map", SECTION, "--field displacement.y --scale 10", "--history")]
 
 
 @pytest.mark.parametrize("options", first_of(1, DRAWINGS))
@@ -531,6 +525,12 @@ def test_a_contact_map_is_seen_along_what_carries():
     (ax,) = fc.plot.contact_map(turned, made_contact(turned, "ZMAX", lambda x: np.ones(len(x))))
     assert areas(ax.collections[0]).sum() == pytest.approx(1.0)
     assert ax.get_xlabel() == "across the contact"
+    long = mesh.replace(points=mesh.points * [0.05, 1.0, 1.0])
+    (ax,) = fc.plot.contact_map(long, made_contact(long, "ZMAX", lambda x: np.ones(len(x))))
+    ax.figure.draw_without_rendering()
+    assert ax.bbox.width > 0.3 * ax.bbox.height
+    assert "scales of the axes differ" in ax.get_title()
+    assert not ax.bbox.overlaps(ax.figure.legends[0].get_window_extent())
     around = mesh.with_groups(points={"ALL": np.flatnonzero((np.abs(mesh.points - 0.5) > 0.49).any(axis=1))})
     with pytest.raises(FastcontactError, match="surrounds its body"):
         fc.plot.contact_map(around, made_contact(around, "ALL", lambda x: np.ones(len(x))))
