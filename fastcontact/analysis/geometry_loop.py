@@ -189,7 +189,7 @@ def _settle(
             return replace(settled, scatter=scatter)
         iterate.u[problem.dofs.active] = mixing.next(settled, before, displacement, tolerance, inexact)
         tolerances.tighten(relative_change, solution.residual)
-        is_slow = not iterate.rounded and (update >= limit // 2 or _stagnates(iterate.history[-WINDOW:]))
+        is_slow = not iterate.rounded and (update >= max(limit // 2, WINDOW) or _stagnates(iterate.history[-WINDOW:]))
         if is_slow and any(pair.may_alternate(constraints.parts[name]) for name, pair in problem.pairs.items()):
             log.info("pairings alternate: edges of facets are now rounded, and small overlaps carry no constraint")
             iterate.rounded = True
@@ -206,9 +206,9 @@ def _settle(
 
 
 def _stagnates(history: Sequence[dict[str, Any]]) -> bool:
-    """Return whether the changes of the displacements do not decrease over the last pairings in the `history`."""
+    """Return whether the changes of the displacements in the last pairings in the `history` are of about the same size."""
     changes = [entry["displacement_change"] for entry in history]
-    return len(changes) >= WINDOW and np.median(changes[WINDOW // 2 :]) >= DECLINE * np.median(changes[: WINDOW // 2])
+    return len(changes) == WINDOW and min(changes) > DECLINE**2 * max(changes)
 
 
 def _store_solution(

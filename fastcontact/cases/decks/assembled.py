@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from sys import intern
 from typing import Any
 
 import numpy as np
@@ -408,7 +409,7 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
 
     `numbers` are stored with targets on faces.
     """
-    keyword, label = row.location.keyword, row.text(1).upper()
+    keyword, label = row.location.keyword, intern(row.text(1).upper())  # many targets share a label
     load = "load " if keyword.endswith("LOAD") else ""
     if keyword in SURFACE_LOADS:
         letter = SURFACE_LOADS[keyword]

@@ -177,10 +177,10 @@ class Deck:
         iterations = step.iterations | ({"reference_reactions": references} if references else {})
         if thickness == 1.0:
             return replace(step, reaction=reaction, iterations=iterations)
-        contacts = {
-            name: replace(contact, **{key: thickness * getattr(contact, key) for key in EXTENSIVE_FIELDS})
-            for name, contact in step.contact.items()
-        }
+        contacts = {}
+        for name, contact in step.contact.items():
+            values = ((key, getattr(contact, key)) for key in EXTENSIVE_FIELDS)
+            contacts[name] = replace(contact, **{key: thickness * value for key, value in values if value is not None})
         sums = [name for name in ("work", "heat") if step.iterations.get(name)]
         iterations |= {name: _scaled(thickness, step.iterations[name]) for name in sums} | {"thickness": thickness}
         if step.pretension:

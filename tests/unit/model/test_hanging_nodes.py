@@ -138,7 +138,7 @@ def test_the_warning_comes_before_the_solution_and_a_mesh_that_fits_is_silent(fi
         assert texts[0].startswith(
             f"4 nodes lie on facets of their own body that they do not belong to (first: point {first} at"
         )
-    assert fc.quality(mesh).hanging_nodes == "".join(texts)
+    assert fc.quality(mesh).hanging_nodes == "".join(texts[:1])
 
 
 CASE = """kinematics = "plane_strain"
