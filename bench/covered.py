@@ -31,8 +31,8 @@ def measure(tests: dict[str, list[str]], workers: int, data: Path) -> int:
     data.mkdir(parents=True, exist_ok=True)
     for old in data.glob(".coverage*"):
         old.unlink()
-    codes = [_run(tests["compiled"], workers, data, "0"), _run(tests["slow"], workers, data, "0", "-m", "slow")]
-    codes.append(_run(tests["interpreted"], workers, data, "1"))
+    kinds = (("compiled", "0", "not slow"), ("slow", "0", "slow"), ("interpreted", "1", "not slow"))
+    codes = [_run(tests[kind], workers, data, disable, "-m", marks) for kind, disable, marks in kinds]
     _coverage(data, "combine", "-q")
     return max(codes)
 

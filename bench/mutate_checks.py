@@ -124,6 +124,8 @@ def collect(work: Path, tree: Path, tests: list[str], workers: int) -> None:
             "reached",
             "-p",
             "no:cacheprovider",
+            "-m",
+            "not slow",
             "-n",
             str(workers),
             *tests,

@@ -71,8 +71,12 @@ def prepare_workers(whole: bool) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """See `pairwise`; before marks are chosen from."""
+    """See `pairwise`; before marks are chosen from. Also mark the tests in ``long_tests.txt``."""
     mark_the_rest(items)
+    long_tests = set((ROOT / "tests/long_tests.txt").read_text().splitlines())
+    for item in items:
+        if item.nodeid in long_tests:
+            item.add_marker("long")
 
 
 @pytest.fixture(autouse=True)
